@@ -15,9 +15,12 @@ from renderer.files import InputError
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("demo:demo", "Run the whole path once: place, render, ask, analyse."),
-    "assets": ("experiments.cli:assets", "List bodies, motions and rooms with their checks."),
-    "motion": ("experiments.cli:motion", "Import motion capture onto the embedded body."),
-    "scene": ("experiments.cli:scene", "Bake and inspect rooms."),
+    "assets": (
+        "experiments.motion.cli:assets",
+        "List bodies, motions and rooms with their checks.",
+    ),
+    "motion": ("experiments.motion.cli:motion", "Import motion capture onto the embedded body."),
+    "scene": ("experiments.scene.cli:scene", "Bake and inspect rooms."),
     "stimuli": ("experiments.cli:stimuli", "Build, verify and tabulate a stimulus set."),
     "evaluate": ("experiments.cli:evaluate", "Place and score methods without rendering."),
     "render": ("experiments.cli:render", "Render one placement into a clip."),

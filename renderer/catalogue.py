@@ -91,16 +91,16 @@ def read_catalogue(path: Path) -> Catalogue:
     raw_clips = _field(source, record, "clips", list)
     clips = tuple(_read_clip(source, index, raw) for index, raw in enumerate(raw_clips))
     _require_unique(source, [clip.clip_id for clip in clips])
-    lists = {
-        name: tuple(_field(source, record, name, list))
-        for name in ("scenes", "motions", "methods", "cameras", "dropped")
-    }
     return Catalogue(
         set_id=_field(source, record, "set_id", str),
         created_at=_field(source, record, "created_at", str),
         generator=_field(source, record, "generator", dict),
+        scenes=tuple(_field(source, record, "scenes", list)),
+        motions=tuple(_field(source, record, "motions", list)),
+        methods=tuple(_field(source, record, "methods", list)),
+        cameras=tuple(_field(source, record, "cameras", list)),
         clips=clips,
-        **lists,
+        dropped=tuple(_field(source, record, "dropped", list)),
     )
 
 
