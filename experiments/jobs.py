@@ -1,0 +1,201 @@
+"""The jobs of the offline stage: prepare a room, place a motion, render what belongs together.
+
+Each is a picklable description with `reusable()` (is its result there?) and a function that does it
+in a process of its own. Heavy modules are imported inside, so that describing work costs nothing.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.config import StimulusSetConfig
+from experiments.records import Key, SetFolder
+from renderer.files import file_sha256, read_json, value_sha256, write_json
+
+if TYPE_CHECKING:
+    from experiments.body.model import BodyModel
+    from experiments.motion.motion import Motion
+    from experiments.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class PrepareJob:
+    """Bake the volumes and the occlusion of one room into the cache."""
+
+    config: StimulusSetConfig
+    scene: str
+
+    def reusable(self) -> str | None:
+        """Baking looks into its own cache: the job always runs and is quick when all is there."""
+        return None
+
+
+@dataclass(frozen=True)
+class PlaceJob:
+    """Place one motion in one room with one method, and score it."""
+
+    config: StimulusSetConfig
+    folder: Path
+    scene: str
+    motion_id: str
+    method: str
+
+    def input_hash(self) -> str:
+        """What the placement depends on."""
+        config = self.config
+        placement = dataclasses.asdict(config.placement)
+        parts = [config.seed, config.body, config.cut_seconds, config.motions_dir, placement]
+        seconds = config.extras.seconds if self.is_extra else None
+        return value_sha256([*parts, self.scene, self.motion_id, self.method, seconds])
+
+    @property
+    def is_extra(self) -> bool:
+        """Whether the motion belongs to practice pairs only."""
+        extras = self.config.extras
+        return extras.practice > 0 and self.motion_id == extras.practice_motion
+
+    def reusable(self) -> str | None:
+        """`"reused"` if a record of the same input exists, else None."""
+        path = SetFolder(self.folder).record_path(self.scene, self.motion_id, self.method)
+        same = path.exists() and read_json(path).get("input_hash") == self.input_hash()
+        return "reused" if same else None
+
+
+@dataclass(frozen=True)
+class RenderJob:
+    """Render all clips of one (scene, motion) that share cameras."""
+
+    config: StimulusSetConfig
+    folder: Path
+    scene: str
+    motion_id: str
+    role: str
+    """main or practice."""
+    extra: int
+    """main: how many catch pairs to add; practice: ordinal of the pair."""
+
+    @property
+    def key(self) -> Key:
+        """(scene, motion)."""
+        return self.scene, self.motion_id
+
+    @property
+    def record_path(self) -> Path:
+        """Where the outcome is noted."""
+        name = f"{self.role}{self.extra}" if self.role == "practice" else self.role
+        return SetFolder(self.folder).clip_record_path(self.scene, self.motion_id, name)
+
+    def input_hash(self) -> str:
+        """What the clips depend on: the placements' bytes and every render setting."""
+        folder = SetFolder(self.folder)
+        hashes = []
+        for method in self.methods():
+            archive = folder.placement_stem(self.scene, self.motion_id, method).with_suffix(".npz")
+            hashes.append(file_sha256(archive) if archive.exists() else "none")
+        settings = [dataclasses.asdict(self.config.render), dataclasses.asdict(self.config.extras)]
+        return value_sha256([settings, hashes, self.scene, self.motion_id, self.role, self.extra])
+
+    def methods(self) -> tuple[str, ...]:
+        """Whose placements are shown."""
+        every = self.config.study_methods
+        return every if self.role == "main" else every[-1:]
+
+    def reusable(self) -> str | None:
+        """`"reused"` if the same input was rendered and every file is still there."""
+        if not self.record_path.exists():
+            return None
+        record = read_json(self.record_path)
+        files = [self.folder / clip[name] for clip in record["clips"] for name in ("file", "poster")]
+        same = record["input_hash"] == self.input_hash() and all(item.exists() for item in files)
+        return "reused" if same else None
+
+
+def run_prepare(job: PrepareJob) -> str:
+    """Bake what later jobs of this room will read."""
+    _one_thread()
+    from experiments.scene.baking import load_room
+    from experiments.scene.stage_parts import stage_parts
+
+    load_room(job.scene)
+    stage_parts(job.scene)
+    return "done"
+
+
+def run_place(job: PlaceJob) -> str:
+    """Place and score; a method that finds no place leaves a record with the reason."""
+    _one_thread()
+    from experiments.methods import METHODS
+    from experiments.placement.errors import PlacementError
+    from experiments.placement.placement import write_placement
+    from experiments.placement.settings import PRESETS
+
+    folder = SetFolder(job.folder)
+    scene, body, motion = load_inputs(job.config, job.scene, job.motion_id, job.is_extra)
+    record: dict[str, Any] = {
+        "scene": job.scene,
+        "motion": job.motion_id,
+        "method": job.method,
+        "study_method": job.method in job.config.study_methods and not job.is_extra,
+        "extra": job.is_extra,
+        "input_hash": job.input_hash(),
+        "failure": "",
+        "scores": {},
+    }
+    try:
+        settings = PRESETS[job.config.placement.preset]
+        placement = METHODS[job.method].place(motion, scene, body, settings, job.config.seed)
+    except PlacementError as error:
+        record["failure"] = str(error)
+    else:
+        record["scores"] = score(placement.motion, motion, scene, body, settings)
+        record["terms"] = placement.terms
+        record["info"] = placement.info
+        write_placement(placement, folder.placement_stem(job.scene, job.motion_id, job.method))
+    write_json(folder.record_path(job.scene, job.motion_id, job.method), record)
+    return "done"
+
+
+def score(
+    placed: Motion, original: Motion, scene: Scene, body: BodyModel, settings: Any
+) -> dict[str, float]:
+    """Plausibility scores of a placed motion as plain numbers for the catalogue."""
+    from experiments.metrics import plausibility
+
+    return plausibility(placed, original, scene, body, settings).as_dict()
+
+
+def load_inputs(
+    config: StimulusSetConfig, scene_name: str, motion_id: str, is_extra: bool = False
+) -> tuple[Scene, BodyModel, Motion]:
+    """The room, the body and the motion (cut as the configuration says) of a job."""
+    from experiments.body.embedded import load_body
+    from experiments.motion.library import load_motion, trim
+    from experiments.motion.motion import read_motion
+    from experiments.scene.baking import load_room
+
+    if config.motions_dir and not is_extra:
+        motion = read_motion(Path(config.motions_dir) / f"{motion_id}.npz")
+    else:
+        motion = load_motion(motion_id, config.body)
+    seconds = config.extras.seconds if is_extra else config.cut_seconds
+    motion = trim(motion, seconds) if seconds else motion
+    return load_room(scene_name), load_body(config.body), motion
+
+
+def run_render(job: RenderJob) -> str:
+    """Choose cameras once and render every clip of the job."""
+    _one_thread()
+    from experiments.clips import render_job
+
+    render_job(job)
+    return "done"
+
+
+def _one_thread() -> None:
+    # Jobs run side by side, one a core; thread pools inside each would only contend.
+    import torch
+
+    torch.set_num_threads(1)
