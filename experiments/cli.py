@@ -1,0 +1,141 @@
+"""Commands of the offline stage: `stimuli build|verify|table`, `evaluate`, `render`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+_OUT = click.option("--out", type=click.Path(path_type=Path), required=True, help="Set folder.")
+_JOBS = click.option(
+    "--jobs", type=click.IntRange(1), default=2, show_default=True, help="Processes."
+)
+_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+
+
+@click.group()
+def stimuli() -> None:
+    """Build, verify and tabulate a stimulus set."""
+
+
+@stimuli.command()
+@click.argument("config", type=click.Path(path_type=Path))
+@_OUT
+@_JOBS
+@_JSON
+def build(config: Path, out: Path, jobs: int, as_json: bool) -> None:
+    """Place and render everything CONFIG asks for; go on where an earlier run stopped."""
+    from experiments.config import read_config
+    from experiments.pipeline import build_set
+
+    with progress_bars(f"{sys.argv[0]} stimuli build {config} --out {out}") as progress:
+        outcome = build_set(read_config(config), out, jobs, progress)
+    record = {
+        "catalogue": str(out / "catalogue.json"),
+        "placements": outcome.placements,
+        "clips": outcome.clips,
+        "dropped": list(outcome.dropped),
+    }
+    text = f"{outcome.clips} clips in {out}; {len(outcome.dropped)} (scene, motion) dropped"
+    click.echo(json.dumps(record) if as_json else text)
+
+
+@stimuli.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@_JSON
+def verify(folder: Path, as_json: bool) -> None:
+    """Recompute hashes and check that pairs differ in the method only; one line per fault."""
+    from renderer.catalogue import read_catalogue, verify_catalogue
+    from renderer.lint import fairness_faults
+
+    faults = verify_catalogue(folder) or fairness_faults(read_catalogue(folder), folder)
+    click.echo(json.dumps({"faults": faults}) if as_json else "\n".join(faults) or "sound")
+    if faults:
+        sys.exit(1)
+
+
+@stimuli.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@_JSON
+def table(folder: Path, as_json: bool) -> None:
+    """Print the plausibility table of a set."""
+    from experiments.evaluate import plausibility_table, read_evaluation
+
+    evaluation = read_evaluation(folder)
+    click.echo(
+        json.dumps({"methods": evaluation["methods"]})
+        if as_json
+        else plausibility_table(evaluation)
+    )
+
+
+@click.command()
+@click.argument("config", type=click.Path(path_type=Path))
+@_OUT
+@_JOBS
+@_JSON
+def evaluate(config: Path, out: Path, jobs: int, as_json: bool) -> None:
+    """Place and score everything CONFIG asks for, without rendering."""
+    from experiments.config import read_config
+    from experiments.evaluate import plausibility_table, write_evaluation
+    from experiments.pipeline import place_set
+
+    settings = read_config(config)
+    with progress_bars(f"{sys.argv[0]} evaluate {config} --out {out}") as progress:
+        folder = place_set(settings, out, jobs, progress)
+    evaluation = write_evaluation(settings, folder)
+    click.echo(
+        json.dumps({"methods": evaluation["methods"]})
+        if as_json
+        else plausibility_table(evaluation)
+    )
+
+
+@click.command()
+@click.argument("placement", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="The .mp4 to write.")
+@click.option("--preset", default="540p", show_default=True, help="Name of a render preset.")
+@click.option(
+    "--tiling", type=click.Choice(["grid", "strip", "single"]), default="grid", show_default=True
+)
+@_JSON
+def render(placement: Path, out: Path, preset: str, tiling: str, as_json: bool) -> None:
+    """Render one PLACEMENT (.json or .npz of a set's placements/ folder) into a clip."""
+    from experiments.clips import render_placement
+
+    clip = render_placement(placement, out, preset, tiling)
+    click.echo(json.dumps(clip) if as_json else f"{out}: {clip['n_frames']} frames")
+
+
+@contextmanager
+def progress_bars(again: str) -> Iterator[Callable[[str, int, int], None]]:
+    """Bars on stderr, one a stage; Ctrl-C says how to go on and exits with status 130."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns: list[Any] = [TextColumn("{task.description:<15}"), BarColumn(), MofNCompleteColumn()]
+    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bars:
+        tasks: dict[str, Any] = {}
+
+        def show(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total)
+            bars.update(tasks[stage], completed=done, total=total)
+
+        try:
+            yield show
+        except KeyboardInterrupt:
+            bars.stop()
+            click.echo(f"interrupted; what is done is kept. Go on with: {again}", err=True)
+            sys.exit(130)
