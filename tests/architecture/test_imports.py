@@ -6,6 +6,7 @@ in at run time. These tests start fresh interpreters and look.
 
 from __future__ import annotations
 
+import ast
 import pkgutil
 import subprocess
 import sys
@@ -28,7 +29,8 @@ def _heavy_modules_after(code: str) -> list[str]:
         [sys.executable, "-c", code + tail], capture_output=True, text=True, cwd=ROOT, check=False
     )
     assert done.returncode == 0, done.stderr
-    return eval(done.stdout.rsplit("HEAVY", 1)[1])
+    found: list[str] = ast.literal_eval(done.stdout.rsplit("HEAVY", 1)[1].strip())
+    return found
 
 
 @pytest.mark.parametrize(
