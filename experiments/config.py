@@ -106,7 +106,9 @@ def _build(source: Path, kind: type[Any], record: dict[str, Any], where: str) ->
             raise InputError(source, f"{where}{name}", value, f"a known key ({hint})")
         values[name] = _value(source, f"{where}{name}", str(fields[name].type), value)
     for name, item in fields.items():
-        required = item.default is dataclasses.MISSING and item.default_factory is dataclasses.MISSING
+        required = (
+            item.default is dataclasses.MISSING and item.default_factory is dataclasses.MISSING
+        )
         if required and name not in values:
             raise InputError(source, f"{where}{name}", "nothing", f"a value ({item.type})")
     return kind(**values)

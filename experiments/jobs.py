@@ -108,7 +108,9 @@ class RenderJob:
         if not self.record_path.exists():
             return None
         record = read_json(self.record_path)
-        files = [self.folder / clip[name] for clip in record["clips"] for name in ("file", "poster")]
+        files = [
+            self.folder / clip[name] for clip in record["clips"] for name in ("file", "poster")
+        ]
         same = record["input_hash"] == self.input_hash() and all(item.exists() for item in files)
         return "reused" if same else None
 

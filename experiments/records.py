@@ -1,12 +1,12 @@
 """The folder of a stimulus set: which record lies where, and what is already done.
 
-    catalogue.json            written last
-    config.json               the configuration that owns the folder
-    evaluation.json           scores of every placement, study methods or not
-    placements/S__M__X.npz    placed motion, .json beside it
-    records/S__M__X.json      scores or the reason why there is no placement
-    records/clips/*.json      what was rendered, by (scene, motion, role)
-    clips/<clip_id>.mp4|.jpg  what participants see
+catalogue.json            written last
+config.json               the configuration that owns the folder
+evaluation.json           scores of every placement, study methods or not
+placements/S__M__X.npz    placed motion, .json beside it
+records/S__M__X.json      scores or the reason why there is no placement
+records/clips/*.json      what was rendered, by (scene, motion, role)
+clips/<clip_id>.mp4|.jpg  what participants see
 """
 
 from __future__ import annotations
