@@ -150,6 +150,7 @@ def _validate(source: Path, config: StimulusSetConfig) -> None:
     for method in config.study_methods:
         if method not in config.methods:
             raise InputError(source, "study_methods", method, "names that stand in methods")
+    _validate_extras(source, config)
     positive = {"render.fps": config.render.fps, "extras.seconds": config.extras.seconds}
     for name, number in positive.items():
         if number <= 0:
@@ -162,3 +163,13 @@ def _validate(source: Path, config: StimulusSetConfig) -> None:
     }.items():
         if number < 0:
             raise InputError(source, name, number, "zero or more")
+
+
+def _validate_extras(source: Path, config: StimulusSetConfig) -> None:
+    # A second pair of the same room and motion would be the same two clips again.
+    if config.extras.practice > len(config.scenes):
+        raise InputError(source, "extras.practice", config.extras.practice, "at most one a scene")
+    pool = len(config.scenes) * len(config.motions)
+    if config.motions and config.extras.catch > pool:
+        wanted = f"at most one for each of the {pool} (scene, motion) pairs"
+        raise InputError(source, "extras.catch", config.extras.catch, wanted)

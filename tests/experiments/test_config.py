@@ -56,6 +56,12 @@ def test_equal_files_give_equal_hashes_and_any_change_another(tmp_path: Path) ->
         ({}, "[render]\nfps = 0\n", ["render.fps", "positive"]),
         ({}, "[render]\npresset = 'x'\n", ["render.presset", "did you mean preset?"]),
         ({}, "[extras]\ncatch = -1\n", ["extras.catch", "zero or more"]),
+        ({}, "[extras]\npractice = 2\n", ["extras.practice", "at most one a scene"]),
+        (
+            {},
+            "[extras]\npractice = 0\ncatch = 2\n",
+            ["extras.catch", "at most one for each of the 1"],
+        ),
         ({}, "[placement\n", ["content", "valid TOML"]),
     ],
 )
