@@ -40,9 +40,9 @@ class RenderConfig:
 class ExtrasConfig:
     """Clips beside the main pool: catch pairs and practice pairs."""
 
-    catch: int = 2
+    catch: int = 1
     """Number of catch pairs: a real placement against the same body lifted off the floor."""
-    practice: int = 2
+    practice: int = 1
     """Number of practice pairs, made from `practice_motion`."""
     practice_motion: str = "stand_idle_look"
     """A motion outside the main pool."""
@@ -150,7 +150,6 @@ def _validate(source: Path, config: StimulusSetConfig) -> None:
     for method in config.study_methods:
         if method not in config.methods:
             raise InputError(source, "study_methods", method, "names that stand in methods")
-    _validate_extras(source, config)
     positive = {"render.fps": config.render.fps, "extras.seconds": config.extras.seconds}
     for name, number in positive.items():
         if number <= 0:
@@ -163,6 +162,7 @@ def _validate(source: Path, config: StimulusSetConfig) -> None:
     }.items():
         if number < 0:
             raise InputError(source, name, number, "zero or more")
+    _validate_extras(source, config)
 
 
 def _validate_extras(source: Path, config: StimulusSetConfig) -> None:
