@@ -91,7 +91,8 @@ def test_one_failure_drops_the_scene_and_motion_for_all_study_methods(tmp_path: 
 
 @pytest.mark.parametrize(
     ("changes", "word"),
-    [({"methods": ("pace", "magic")}, "magic"), ({"motions": ("fly",)}, "fly"), ({"scenes": ("moon",)}, "moon"),
+    [({"methods": ("pace", "magic")}, "magic"), ({"motions": ("fly",)}, "fly"),
+     ({"scenes": ("moon",)}, "moon"),
      ({"motions": ("stand_idle_look",)}, "outside the main pool")],
 )  # fmt: skip
 def test_unknown_names_are_refused_before_anything_is_computed(
