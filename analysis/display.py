@@ -54,5 +54,3 @@ def fixed(value: float | None, digits: int = 2) -> str:
 def holding(count: int, singular: str, plural: str | None = None) -> str:
     """`1 answer`, `2 answers`."""
     return f"{count:,} {singular if count == 1 else plural or singular + 's'}"
-
-
