@@ -6,6 +6,7 @@ The renderer knows no method, no motion format and no study. Frame: z up, metres
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -36,6 +37,12 @@ class StagePart:
     texture: UInt8[np.ndarray, "h w 3"] | None = None
     wall: str | None = None
     """The wall (n, e, s, w) that this part is or belongs to, if any."""
+    released: dict[str, Float[np.ndarray, "F 3"]] = field(default_factory=dict)
+    """By group: how much `occlusion` grows in a view where that tall object is hidden."""
+
+    def occlusion_without(self, hidden: Collection[str]) -> Float[np.ndarray, "F 3"]:
+        """Occlusion per corner in a view that hides these groups: no dark patch stays behind."""
+        return self.occlusion + sum((self.released[g] for g in self.released if g in hidden), 0.0)
 
 
 @dataclass(frozen=True)
