@@ -35,7 +35,9 @@ def body_regions(
     low = vertices[:, _UP] < vertices[in_skin, _UP].min() + _SOLE_HEIGHT_M
     hips, knees = joints[1:3, _UP].mean(), joints[4:6, _UP].mean()
     above_fold = vertices[:, _UP] > hips - 0.18 * (hips - knees)
-    seat = parts("pelvis", "left_hip", "right_hip") & ((backward > 0.4) | (downward > 0.6))
+    behind = vertices[:, _FRONT] < joints[1:3, _FRONT].mean()
+    facing = (backward > 0.4) | (behind & (downward > 0.6))
+    seat = parts("pelvis", "left_hip", "right_hip") & facing
     below_waist = vertices[:, _UP] < hips + 0.25 * (hips - knees)
     masks = {
         "buttocks": seat & above_fold & below_waist,

@@ -59,7 +59,7 @@ class SkinnedBody:
     ) -> BodyMesh:
         """Skin the vertices named (all if None); see `BodyModel.posed`.
 
-        Computed in the precision of `pose`. The vertices may be a permuted (not contiguous) view.
+        Computed in the precision of `pose`. The vertices are a permuted (not contiguous) view.
         """
         rotations, positions = self.joint_transforms(pose, transl)
         rest_joints = self._tensor("rest_joints", pose.dtype)
