@@ -42,7 +42,12 @@ class StagePart:
 
     def occlusion_without(self, hidden: Collection[str]) -> Float[np.ndarray, "F 3"]:
         """Occlusion per corner in a view that hides these groups: no dark patch stays behind."""
-        return self.occlusion + sum((self.released[g] for g in self.released if g in hidden), 0.0)
+        gained = [self.released[group] for group in self.released if group in hidden]
+        if not gained:
+            return self.occlusion
+        brightest = np.maximum(self.occlusion, 1.0)
+        freed: Float[np.ndarray, "F 3"] = np.minimum(self.occlusion + sum(gained), brightest)
+        return freed
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,8 @@ def vote_directions() -> Float32[np.ndarray, "26 3"]:
         nearest = (turned @ turned[order].T).max(axis=1)
         nearest[order] = np.inf
         order.append(int(np.argmin(nearest)))
-    return turned[order].astype(np.float32)
+    spread: Float32[np.ndarray, "26 3"] = turned[order].astype(np.float32)
+    return spread
 
 
 def ray_scene(corners: Float[np.ndarray, "F 3 3"]) -> EmbreeScene:
@@ -66,7 +67,8 @@ def occluded(
     if not len(origins):
         return np.zeros(0, dtype=bool)
     hit = scene.run(origins, np.ascontiguousarray(directions), query="OCCLUDED")
-    return np.asarray(hit >= 0)
+    found: Bool[np.ndarray, " N"] = np.asarray(hit >= 0)
+    return found
 
 
 def _rotation(axis: Float[np.ndarray, "3"], angle: float) -> Float[np.ndarray, "3 3"]:

@@ -148,7 +148,8 @@ class PlanarTriangles:
         np.minimum(planar, _to_segment(x - b, y, cx - b, cy), out=planar)
         inside = (y >= 0) & (x * cy >= y * cx) & ((b - x) * cy >= y * (b - cx))
         planar[inside] = 0
-        return np.sqrt(planar + z * z)
+        distance: Float32[np.ndarray, " N"] = np.sqrt(planar + z * z)
+        return distance
 
 
 def _to_segment(
