@@ -50,7 +50,6 @@ RULES: tuple[Rule, ...] = (
 )  # fmt: skip
 
 RULE_NAMES: tuple[str, ...] = tuple(rule.name for rule in RULES)
-DEFAULT_RULES: Rules = {"max_catch_failures": 1.0, "min_answered_share": 0.5, "drop_late": 1.0}
 _MANUFACTURING = ("majority", "consensus", "outlier", "agreement_with")
 
 

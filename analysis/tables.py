@@ -1,0 +1,170 @@
+"""Tables of the report, built from `results.json` alone and written as text, Markdown, CSV and HTML."""
+
+from __future__ import annotations
+
+import csv
+import html
+import io
+import textwrap
+from dataclasses import dataclass
+from typing import Any
+
+from analysis.results import Results
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A titled table of ready strings; the first column is text, the others are numbers."""
+
+    name: str
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+def preference_table(results: Results) -> Table:
+    """The main table: one row per baseline, headline interval, naive interval labelled as such."""
+    level = f"{results['level'] * 100:g} %"
+    rows = tuple(
+        (
+            name, f"{row['n']:,}", row["display"]["baseline_rate"], row["display"]["rate"],
+            row["display"]["ci"], row["display"]["p_holm"], row["display"]["design_effect"],
+            row["display"]["ci_naive"],
+        )
+        for name, row in results["baselines"].items()
+    )  # fmt: skip
+    header = (
+        "compared with", "answers", "baseline %", "target %", f"{level} CI", "p (Holm)",
+        "design effect", "naive CI*",
+    )  # fmt: skip
+    return Table("preference", "Preference per baseline", header, rows, preference_note(results))
+
+
+def preference_note(results: Results) -> str:
+    """What the columns of the main table mean, and on how many people and stimuli they rest."""
+    flow = results["flow"]
+    notes = [
+        f"Target: {', '.join(results['targets'])}. Intervals: participant x stimulus cluster-robust "
+        "on the logit scale; p against 50 % from the same model, Holm-adjusted over the rows.",
+        "* Wilson; assumes independent answers.",
+        f"{flow['analysed']:,} answers of {flow['analysed_participants']} participants analysed; "
+        f"{flow['rows']:,} rows read.",
+    ]
+    notes += [
+        f"{name}: {flag}." for name, row in results["baselines"].items() for flag in row["flags"]
+    ]
+    return " ".join(notes)
+
+
+def flow_table(results: Results) -> Table:
+    """From the rows of the file to the answers analysed; the counts add up."""
+    flow = results["flow"]
+    rows = [("rows in the file", f"{flow['rows']:,}", "")]
+    rows += [(f"not analysed: mode {m}", f"−{c:,}", "") for m, c in flow["other_mode"].items()]
+    rows += [(f"not analysed: {k} trials", f"−{c:,}", "") for k, c in flow["other_kind"].items()]
+    people = flow["excluded_participants"]
+    rows += [
+        (f"excluded: {rule}", f"−{count:,}", f"−{people[rule]}" if rule in people else "")
+        for rule, count in flow["excluded_answers"].items()
+    ]
+    rows.append(("analysed", f"{flow['analysed']:,}", f"{flow['analysed_participants']}"))
+    header = ("step", "answers", "participants")
+    return Table("flow", "From the file to the analysis", header, tuple(rows))
+
+
+def all_tables(results: Results) -> list[Table]:
+    """Every table of the report, in reading order."""
+    return [preference_table(results), flow_table(results)]
+
+
+def terminal_table(results: Results) -> str:
+    """The main table as plain text of at most 100 columns, with watermark and notes."""
+    mark = results["watermark"]
+    title = f"Preference for {', '.join(results['targets'])}" + (f"   [{mark}]" if mark else "")
+    table = preference_table(results)
+    short = tuple(name.replace("design effect", "deff") for name in table.header)
+    return "\n".join([title, *_aligned((short, *table.rows)), *_wrapped(table.note, 100)])
+
+
+def markdown(table: Table, mark: str) -> str:
+    """A pipe table under its title."""
+    cells = [[_escape_pipe(cell) for cell in row] for row in (table.header, *table.rows)]
+    lines = ["| " + " | ".join(row) + " |" for row in cells]
+    lines.insert(1, "|---" + "|---:" * (len(table.header) - 1) + "|")
+    head = [f"### {table.title}", ""] + ([f"**{mark}**", ""] if mark else [])
+    return "\n".join([*head, *lines, *(["", table.note] if table.note else []), ""])
+
+
+def html_table(table: Table) -> str:
+    """A `<table>` with caption, column headers and row headers."""
+    head = "".join(f'<th scope="col">{html.escape(cell)}</th>' for cell in table.header)
+    body = "".join(
+        f'<tr><th scope="row">{html.escape(row[0])}</th>'
+        + "".join(f"<td>{html.escape(cell)}</td>" for cell in row[1:])
+        + "</tr>\n"
+        for row in table.rows
+    )
+    note = f'<p class="note">{html.escape(table.note)}</p>' if table.note else ""
+    caption = f"<caption>{html.escape(table.title)}</caption>"
+    return f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table>{note}"
+
+
+def tidy_csv(records: dict[str, dict[str, Any]], key: str, mark: str) -> str:
+    """Unrounded values, one record a row, the watermark in a column of its own.
+
+    Text that a spreadsheet would run as a formula is preceded by an apostrophe.
+    """
+    flat = [{key: name} | _flatten(record) for name, record in records.items()]
+    names = list(dict.fromkeys(column for record in flat for column in record))
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow([*names, "status"])
+    for record in flat:
+        cells = [_safe(record.get(name, "")) for name in names]
+        writer.writerow([*cells, mark or "final"])
+    return stream.getvalue()
+
+
+def _flatten(record: dict[str, Any]) -> dict[str, Any]:
+    """Lists become numbered columns, flags one cell; display strings stay out (round for yourself)."""
+    flat: dict[str, Any] = {}
+    for name, value in record.items():
+        if name == "display":
+            continue
+        if name == "flags":
+            flat[name] = "; ".join(value)
+        elif isinstance(value, list) and len(value) == 2:
+            flat[f"{name}_low"], flat[f"{name}_high"] = value
+        elif isinstance(value, list):
+            flat |= {f"{name}_{index}": item for index, item in enumerate(value, 1)}
+        elif isinstance(value, dict):
+            flat |= {f"{name}_{inner}": item for inner, item in _flatten(value).items()}
+        else:
+            flat[name] = "" if value is None else value
+    return flat
+
+
+def _safe(cell: Any) -> Any:
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell
+
+
+def _escape_pipe(cell: str) -> str:
+    return cell.replace("|", "\\|")
+
+
+def _aligned(rows: tuple[tuple[str, ...], ...]) -> list[str]:
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    widths[0] = min(widths[0], 24)
+    lines = []
+    for row in rows:
+        first = row[0] if len(row[0]) <= widths[0] else row[0][: widths[0] - 1] + "…"
+        cells = [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
+        lines.append("  ".join([first.ljust(widths[0]), *cells]).rstrip())
+    return [lines[0], "-" * max(len(line) for line in lines), *lines[1:]]
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    return textwrap.wrap(text, width)
