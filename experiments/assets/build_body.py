@@ -26,7 +26,7 @@ from experiments.assets.anny_source import (
 )
 from experiments.body.embedded import BODY_FILE, POINT_UNIT_M, SCHEMA_VERSION
 from experiments.body.regions import body_regions, contact_rows
-from renderer.files import atomic_path, file_sha256, write_json
+from renderer.files import InputError, atomic_path, file_sha256, write_json
 
 _SMALL_MESHES = {"615": "notoes_collapse5pc", "1229": "notoes_collapse10pc"}
 _WEIGHT_STEPS = 65535
@@ -57,7 +57,7 @@ def build_arrays() -> tuple[dict[str, Any], dict[str, Any]]:
         "body_component": component.astype(np.uint16),
     }
     for name, body in bodies.items():
-        arrays[f"points_{name}"] = np.round(body.points / POINT_UNIT_M).astype(np.int16)
+        arrays[f"points_{name}"] = quantised_points(body)
         arrays[f"joints_{name}"] = body.joints.astype(np.float32)
     for count, topology in _SMALL_MESHES.items():
         subset, small_faces = _snapped(model, topology, shapes["male_slim"], component)
@@ -65,6 +65,15 @@ def build_arrays() -> tuple[dict[str, Any], dict[str, Any]]:
         arrays[f"faces{count}"] = small_faces.astype(np.uint16)
     arrays |= _region_arrays(model_body, faces, component, arrays["subset615"].astype(np.int64))
     return arrays, _provenance(shapes, bodies)
+
+
+def quantised_points(body: MergedBody) -> Integer[np.ndarray, "E 3"]:
+    """Weighted rest points relative to their joint, p - w h, in steps of `POINT_UNIT_M`."""
+    local = body.points - body.weight[:, None] * body.joints[body.joint]
+    steps = np.round(local / POINT_UNIT_M)
+    if np.abs(steps).max() > np.iinfo(np.int16).max:
+        raise InputError("body", "points", float(np.abs(local).max()), "less than 0.65 m")
+    return steps.astype(np.int16)
 
 
 def _provenance(

@@ -16,8 +16,8 @@ from renderer.files import InputError, file_sha256, read_json
 BODY_NAMES: tuple[str, ...] = ("female_slim", "male_slim", "female_heavy", "male_heavy")
 BODY_FILE = Path(__file__).resolve().parents[1] / "assets" / "body.npz"
 SCHEMA_VERSION = 1
-POINT_UNIT_M = 5e-5
-"""Step of the stored rest points: 0.05 mm."""
+POINT_UNIT_M = 2e-5
+"""Step of the stored rest points, 0.02 mm: the worst vertex of random poses is then 0.06 mm off."""
 
 
 @lru_cache(maxsize=8)
@@ -73,6 +73,10 @@ def _points(arrays: dict[str, Any], name: str) -> Float[np.ndarray, "V 22 4"]:
     weight = arrays["weight"].astype(np.float64)
     total = np.bincount(vertex, weight)
     dense = np.zeros((len(total), 22, 4))
-    dense[vertex, joint, :3] = arrays[f"points_{name}"] * POINT_UNIT_M
-    dense[vertex, joint, 3] = weight / total[vertex]
+    weight = weight / total[vertex]
+    heads = arrays[f"joints_{name}"].astype(np.float64)
+    dense[vertex, joint, :3] = (
+        arrays[f"points_{name}"] * POINT_UNIT_M + weight[:, None] * heads[joint]
+    )
+    dense[vertex, joint, 3] = weight
     return dense
