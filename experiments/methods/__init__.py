@@ -1,0 +1,66 @@
+"""The methods that place a motion in a scene, by name. Adding one is a file and an entry here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from experiments.body.model import BodyModel
+from experiments.methods.pace import pace, pace_no_motion, pace_no_pose
+from experiments.methods.posa_t import posa_t
+from experiments.motion.motion import Motion
+from experiments.placement.placement import Placement
+from experiments.placement.settings import PlacementSettings
+from experiments.scene.scene import Scene
+
+Place = Callable[[Motion, Scene, BodyModel, PlacementSettings, int], Placement]
+"""(motion, scene, body, settings, seed) -> placement; raises `PlacementError` where there is none.
+
+The seed stands for all that a method draws at random; the methods here draw nothing and record it.
+"""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A named way to place a motion."""
+
+    place: Place
+    display_name: str
+    summary: str
+    """One line."""
+    alters_motion: bool
+    study: bool
+    """Shown to participants; ablations are placed and scored only."""
+
+
+METHODS: dict[str, Method] = {
+    "posa_t": Method(
+        posa_t,
+        "POSA-T",
+        "POSA's loss summed over all frames; the motion is moved rigidly, all frames count alike",
+        alters_motion=False,
+        study=True,
+    ),
+    "pace": Method(
+        pace,
+        "PACE",
+        "weighted frames; place, pose and translation of every frame are optimised together",
+        alters_motion=True,
+        study=True,
+    ),
+    "pace_no_pose": Method(
+        pace_no_pose,
+        "PACE without pose term",
+        "ablation: nothing holds a pose to the original",
+        alters_motion=True,
+        study=False,
+    ),
+    "pace_no_motion": Method(
+        pace_no_motion,
+        "PACE without motion term",
+        "ablation: nothing holds a frame to its neighbours",
+        alters_motion=True,
+        study=False,
+    ),
+}
+"""Every method there is, in the order of tables."""

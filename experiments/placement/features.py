@@ -1,0 +1,45 @@
+"""Which feature map of an interaction model a (motion, scene) is placed and scored with."""
+
+from __future__ import annotations
+
+from experiments.body.model import BodyModel
+from experiments.interaction.features import InteractionFeatures
+from experiments.interaction.registry import INTERACTIONS, first_fitting_map
+from experiments.motion.motion import Motion
+from experiments.placement.candidates import coarse_best, start_grid
+from experiments.placement.errors import NoAdmissibleStart
+from experiments.placement.problem import build_problem
+from experiments.placement.settings import PlacementSettings
+from experiments.scene.scene import Scene
+from renderer.files import InputError
+
+
+def choose_features(
+    motion: Motion, scene: Scene, body: BodyModel, settings: PlacementSettings
+) -> InteractionFeatures:
+    """The feature map that every method and metric uses for this motion in this scene.
+
+    `posa`: the first whose most common class exists in the scene. `search` (ours): the one whose
+    best start is best at uniform weights, whatever the method, so that all methods are asked for
+    the same contacts. Raises `PlacementError` where no map has a start.
+    """
+    if settings.interaction not in INTERACTIONS:
+        wanted = "one of " + ", ".join(INTERACTIONS)
+        raise InputError("placement settings", "interaction", settings.interaction, wanted)
+    maps = INTERACTIONS[settings.interaction](motion, body, scene.class_names())
+    if settings.feature_choice == "posa":
+        return maps[first_fitting_map(maps, scene)]
+    if len(maps) == 1:
+        return maps[0]
+    scores: list[tuple[float, int]] = []
+    refusal: NoAdmissibleStart | None = None
+    for index, features in enumerate(maps):
+        problem = build_problem(motion, scene, body, settings, features)
+        try:
+            scores.append((coarse_best(problem, start_grid(problem)), index))
+        except NoAdmissibleStart as error:
+            refusal = refusal or error
+    if not scores:
+        assert refusal is not None
+        raise refusal
+    return maps[min(scores)[1]]

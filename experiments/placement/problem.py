@@ -1,0 +1,139 @@
+"""Problem: one motion, one scene, its interaction features and frame weights, ready to be solved."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int64, Integer
+from torch import Tensor
+
+from experiments.body.model import BodyModel
+from experiments.interaction.features import InteractionFeatures
+from experiments.motion.motion import Motion
+from experiments.placement.objectives import placement_terms
+from experiments.placement.rigid import clip_centre, clip_floor, move
+from experiments.placement.scene_field import SceneField
+from experiments.placement.settings import PlacementSettings
+from experiments.scene.scene import MPCAT40, Scene
+from experiments.weighting.weights import FrameWeights, uniform_weights
+
+_FLOOR = 2
+REFERENCE_STEP_S = 1.0 / 30.0
+
+
+@dataclass(frozen=True)
+class Problem:
+    """All that does not change while a motion is placed in a scene. Clip frame unless said.
+
+    Axes: T frames, V vertices of the features' mesh.
+    """
+
+    motion: Motion
+    scene: Scene
+    body: BodyModel
+    settings: PlacementSettings
+    features: InteractionFeatures
+    weights: FrameWeights
+    field: SceneField
+    pose: Float[Tensor, "T 22 3"]
+    transl: Float[Tensor, "T 3"]
+    vertices: Float[Tensor, "T V 3"]
+    """Unaltered body, metres."""
+    pelvis: Float[np.ndarray, "T 3"]
+    contact: Bool[Tensor, "T V"]
+    """Predicted contact above the threshold; fixed during optimisation."""
+    wanted: Int64[Tensor, "T V"]
+    """Predicted class, 0 (void) where there is no contact."""
+    k: Float[Tensor, " T"]
+    step_scale: Float[Tensor, " T"]
+    centre: Float[Tensor, "2"]
+    floor: float
+    """Height of the clip's own floor, metres."""
+
+    @property
+    def vertex_ids(self) -> Integer[np.ndarray, " V"]:
+        """The vertices of the energy, in the body's full numbering."""
+        return self.features.vertex_ids
+
+    def terms(
+        self, vertices: Float[Tensor, "*B T V 3"], huber: float = 0.0, semantics: bool = True
+    ) -> dict[str, Float[Tensor, "*B"]]:
+        """E_p by terms for bodies in the scene's frame, for any number of starts at once."""
+        distance = self.field.distance(vertices, self.contact)
+        label = self.field.label(vertices.detach()) if semantics else None
+        return placement_terms(
+            distance, label, self.contact, self.wanted, self.k, self.settings, huber
+        )
+
+    def moved(
+        self, yaw: Float[Tensor, "*B"], translation: Float[Tensor, "*B 3"]
+    ) -> Float[Tensor, "*R 3"]:
+        """The unaltered body moved rigidly into the scene's frame."""
+        return move(self.vertices, yaw, translation, self.centre)
+
+    def weighted(self, weights: FrameWeights) -> Problem:
+        """The same with other frame weights."""
+        k = torch.as_tensor(weights.values, dtype=self.k.dtype)
+        return dataclasses.replace(self, weights=weights, k=k)
+
+    def expected_classes(self) -> list[str]:
+        """Names of the classes that the motion expects to touch, floor left out."""
+        present = torch.unique(self.wanted[self.beyond_floor()]).tolist()
+        return [MPCAT40[index] for index in present]
+
+    def beyond_floor(self) -> Bool[Tensor, "T V"]:
+        """Contact vertices that expect something other than the floor."""
+        return self.contact & (self.wanted != _FLOOR)
+
+
+def build_problem(
+    motion: Motion,
+    scene: Scene,
+    body: BodyModel,
+    settings: PlacementSettings,
+    features: InteractionFeatures,
+    weights: FrameWeights | None = None,
+    dtype: torch.dtype = torch.float32,
+) -> Problem:
+    """Skin the unaltered motion once and turn features and weights into tensors.
+
+    Without weights every frame counts alike.
+    """
+    weights = weights or uniform_weights(motion.n_frames)
+    pose = torch.as_tensor(motion.pose, dtype=dtype)
+    transl = torch.as_tensor(motion.transl, dtype=dtype)
+    mesh = body.posed(pose, transl, features.vertex_ids)
+    pelvis = mesh.joints[:, 0].double().numpy()
+    lowest = mesh.vertices[..., 2].min(1).values.double().numpy()
+    contact = torch.as_tensor(features.contact > settings.contact_threshold)
+    classes = torch.as_tensor(features.semantics.argmax(-1), dtype=torch.int64)
+    step_scale = time_step_scale(motion.times) if settings.time_aware else np.ones(len(pelvis))
+    return Problem(
+        motion=motion,
+        scene=scene,
+        body=body,
+        settings=settings,
+        features=features,
+        weights=weights,
+        field=SceneField(scene, dtype),
+        pose=pose,
+        transl=transl,
+        vertices=mesh.vertices.contiguous(),
+        pelvis=pelvis,
+        contact=contact,
+        wanted=torch.where(contact, classes, 0),
+        k=torch.as_tensor(weights.values, dtype=dtype),
+        step_scale=torch.as_tensor(step_scale, dtype=dtype),
+        centre=torch.as_tensor(clip_centre(pelvis), dtype=dtype),
+        floor=clip_floor(lowest),
+    )
+
+
+def time_step_scale(times: Float[np.ndarray, " T"]) -> Float[np.ndarray, " T"]:
+    """(1/30 s) / (time since the frame before), 1 for frame 0: what differences are multiplied by."""
+    steps = np.diff(times, prepend=times[0] - REFERENCE_STEP_S)
+    scale: Float[np.ndarray, " T"] = REFERENCE_STEP_S / steps
+    return scale

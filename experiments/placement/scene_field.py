@@ -1,0 +1,39 @@
+"""What a placement reads of a scene: signed distance and nearest class at body vertices."""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Bool, Float, Int64
+from torch import Tensor
+
+from experiments.scene.lookup import SceneLookup
+from experiments.scene.scene import Scene
+
+
+class SceneField:
+    """Distances for the energy of a placement.
+
+    Vertices in contact read the true surface, so that a seat is touched and not the air above it;
+    all others read the thickened one, in which thin boards register.
+    """
+
+    def __init__(self, scene: Scene, dtype: torch.dtype = torch.float32) -> None:
+        self._thick = SceneLookup(scene, thickened=True, dtype=dtype)
+        self._plain = SceneLookup(scene, thickened=False, dtype=dtype)
+
+    def distance(
+        self, points: Float[Tensor, "*B T V 3"], contact: Bool[Tensor, "T V"]
+    ) -> Float[Tensor, "*B T V"]:
+        """Signed distance in metres, negative inside solids; points in the scene's frame."""
+        distance = self._thick.distance(points)
+        ever = contact.any(0)
+        if not ever.any():
+            return distance
+        plain = self._plain.distance(points[..., ever, :])
+        # Only the columns that are ever in contact are read twice.
+        column = torch.cumsum(ever, 0).sub(1).clamp(min=0)
+        return torch.where(contact, plain[..., column], distance)
+
+    def label(self, points: Float[Tensor, "*B T V 3"]) -> Int64[Tensor, "*B T V"]:
+        """Class of the nearest surface (mpcat40 index)."""
+        return self._plain.label(points)

@@ -1,0 +1,124 @@
+"""PlacementSettings: every number of a placement, with the presets fast, default and paper."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Literal
+
+from renderer.files import value_sha256
+
+
+@dataclass(frozen=True)
+class PlacementSettings:
+    """What all methods share, so that they differ in the method alone.
+
+    Sources: POSA (Hassan et al. 2021), its published code, PACE (Mullen and Manocha 2023). Values
+    that none of them gives are ours; `docs/reference/placement.md` says which and why.
+    """
+
+    preset: str = "default"
+    """Name of the preset these settings began as."""
+
+    # Interaction features
+    interaction: str = "geometric"
+    """Which model predicts contact and classes: a name in `INTERACTIONS`."""
+    feature_choice: Literal["search", "posa"] = "search"
+    """How one of several feature maps is chosen: `posa` takes the first whose most common class
+    exists in the scene, `search` (ours) the one with the best start."""
+    contact_threshold: float = 0.5
+    """A vertex is in contact where f_c exceeds this (POSA)."""
+
+    # Start search
+    grid_step: float = 0.2
+    """Distance of neighbouring start positions, metres (POSA)."""
+    yaw_step_deg: float = 30.0
+    """Distance of neighbouring start yaws, degrees (PACE)."""
+    inset: float = 0.35
+    """Start positions keep this distance from the walls, metres (POSA: 0.75)."""
+    start_layers: tuple[float, ...] = (0.0,)
+    """Heights of the clip's floor above the scene's floor at the start, metres."""
+    start_filter: float | None = 0.5
+    """Reject starts where less than this share of the contact vertices that expect something other
+    than floor stand nearest to their class (ours); None keeps all."""
+    wall_clearance: float = 0.15
+    """The pelvis path stays this far inside the room, metres (ours)."""
+    max_depth: float | None = 0.30
+    """Reject a fit where a vertex without contact is deeper than this inside something,
+    metres (ours); None keeps all."""
+    coarse_frames: int = 20
+    """Frames of the first, coarse scoring of all starts."""
+    coarse_vertices: int = 90
+    """Vertices without contact of the coarse scoring."""
+    keep_share: float = 0.05
+    """Share of the starts that is scored exactly."""
+    suppress_distance: float = 0.4
+    """Starts closer than this, metres, and `suppress_angle_deg` count as one."""
+    suppress_angle_deg: float = 46.0
+    """See `suppress_distance`."""
+    n_starts: int = 3
+    """Starts that are optimised (POSA: 10)."""
+    n_altered: int = 3
+    """Starts, best rigid fits first, whose motion is altered (PACE)."""
+
+    # Energy
+    contact_weight: float = 1.0
+    """Weight of the contact term, per m² (POSA)."""
+    penetration_weight: float = 10.0
+    """Weight of the penetration term, per m (POSA)."""
+    semantic_weight: float = 0.01
+    """Weight of one contact vertex near the wrong class (POSA)."""
+    contact_tolerance: float | None = None
+    """Contact vertices deeper than this, metres, pay the penetration term too (ours, proposed 0.003);
+    None leaves them out of it as POSA does."""
+    huber_widths: tuple[float, ...] = (0.01, 0.003)
+    """Widths of the rounded kink of the penalty, metres, in the order in which the outer steps
+    walk through them; (0.0,) is the printed penalty. Reported energies are always unrounded."""
+    lambda_pose: float = 0.1
+    """Weight of L_pose, per rad²."""
+    lambda_mot: float = 10.0
+    """Weight of L_mot, per rad²."""
+    lambda_tau: float = 50.0
+    """Weight of the translation half inside L_mot, per m²: `lambda_mot` * `lambda_tau` in all."""
+    time_aware: bool = True
+    """Scale frame-to-frame differences to steps of 1/30 s; False is the printed form."""
+
+    # Optimiser
+    parameterisation: Literal["whitened", "raw", "dct"] = "whitened"
+    """Variables of the alteration: whitened along time, one a frame, or low frequencies alone."""
+    dct_per_frame: float = 16 / 90
+    """Share of cosine vectors kept under `dct`."""
+    outer_steps: int = 10
+    """Calls of the optimiser (PACE)."""
+    inner_iterations: int = 20
+    """L-BFGS iterations within one call (POSA's code)."""
+    history: int = 100
+    """Curvature pairs L-BFGS remembers (POSA's code)."""
+    relative_tolerance: float = 1e-4
+    """Stop after two outer steps that each lower the energy by less than this share of it."""
+    give_up_factor: float | None = 2.0
+    """Give a start up after three outer steps if it is this many times worse than the best start
+    so far; None never gives up."""
+
+    def config_hash(self) -> str:
+        """Hash of every value, for provenance."""
+        return value_sha256(dataclasses.asdict(self))
+
+
+PRESETS: dict[str, PlacementSettings] = {
+    "fast": PlacementSettings(preset="fast", n_starts=2, n_altered=1, outer_steps=6),
+    "default": PlacementSettings(),
+    "paper": PlacementSettings(
+        preset="paper",
+        feature_choice="posa",
+        inset=0.75,
+        start_filter=None,
+        max_depth=None,
+        n_starts=10,
+        n_altered=10,
+        huber_widths=(0.0,),
+        give_up_factor=None,
+    ),
+}
+"""Named settings: `fast` for demonstrations and tests, `default`, and `paper` as near to the printed
+method as its text allows."""
