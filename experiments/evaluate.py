@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +18,14 @@ FILE_NAME = "evaluation.json"
 COLUMNS: tuple[tuple[str, str, int], ...] = (
     ("non_collision", "non-coll.", 3),
     ("contact", "contact", 3),
-    ("contact_1cm", "cont. 1cm", 3),
-    ("contact_share_2cm", "near 2cm", 2),
-    ("contact_not_floor", "not floor", 2),
-    ("depth_mean_m", "depth m", 2),
-    ("semantic_match", "sem.", 2),
-    ("mean_angle_deg", "mean deg", 2),
-    ("max_angle_deg", "max deg", 1),
-    ("jerk_change_mm", "jerk +", 2),
+    ("contact_1cm", "at 1 cm", 3),
+    ("cv2", "cv2", 2),
+    ("contact_beyond_floor", "not floor", 2),
+    ("depth_max_m", "depth m", 3),
+    ("semantic_match", "class", 2),
+    ("angle_mean_deg", "mean deg", 2),
+    ("angle_max_deg", "max deg", 1),
+    ("jerk_change_mm", "jerk +mm", 2),
 )
 """Score, heading, decimals. Scores that a placement does not have print as a dash."""
 
@@ -74,6 +75,14 @@ def read_evaluation(folder: Path) -> dict[str, Any]:
     return record
 
 
+LEGEND = (
+    "non-coll., contact: strict scores of the literature on the full mesh; at 1 cm: contact within 1 cm; "
+    "cv2: predicted contact vertices within 2 cm; not floor: contact with anything but floor; "
+    "depth: deepest vertex; class: predicted contacts nearest to their class; deg: change of joint "
+    "angles; jerk +: added jerk in mm per frame cubed."
+)
+
+
 def plausibility_table(evaluation: dict[str, Any]) -> str:
     """The table as plain text, one line a method; scores are means over clips.
 
@@ -88,10 +97,11 @@ def plausibility_table(evaluation: dict[str, Any]) -> str:
             cells.append(f"{means[score]:.{decimals}f}" if score in means else "-")
         lines.append(cells)
     widths = [max(len(row[i]) for row in [heads, *lines]) for i in range(len(heads))]
-    return "\n".join(
+    body = "\n".join(
         "  ".join(
             cell.ljust(width) if i == 0 else cell.rjust(width)
             for i, (cell, width) in enumerate(zip(row, widths, strict=True))
         ).rstrip()
         for row in [heads, ["-" * width for width in widths], *lines]
     )
+    return body + "\n" + textwrap.fill(LEGEND, 110)
