@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -30,6 +30,7 @@ class BodyMesh:
     faces: Integer[np.ndarray, "F 3"]
 
 
+@runtime_checkable
 class BodyModel(Protocol):
     """Linear blend skinning of one adult on the 22 SMPL-X body joints.
 
