@@ -17,7 +17,15 @@ from analysis.codebook import read_codebook
 from analysis.exclusions import apply_rules, select_mode
 from analysis.preference import comparisons, preference_table
 from analysis.responses import read_responses
-from analysis.results import RESULTS_VERSION, Results, preference_record, versions, watermark
+from analysis.results import (
+    RESULTS_VERSION,
+    Results,
+    ordered,
+    preference_record,
+    read_results,
+    versions,
+    watermark,
+)
 from renderer.files import write_bytes, write_json
 
 LEVEL = 0.95
@@ -25,8 +33,9 @@ LEVEL = 0.95
 
 def analyze(responses_csv: Path, out: Path, *, seed: int = 0, mode: str | None = None) -> Results:
     """Analyse one export and write every output into `out`; returns what `results.json` holds."""
-    results = estimate(responses_csv, seed=seed, mode=mode)
-    write_json(out / "results.json", results)
+    path = out / "results.json"
+    write_json(path, estimate(responses_csv, seed=seed, mode=mode))
+    results = read_results(path)
     write_outputs(results, out)
     return results
 
@@ -56,6 +65,7 @@ def estimate(responses_csv: Path, *, seed: int = 0, mode: str | None = None) -> 
         "watermark": watermark(mode, codebook.frozen),
         "targets": sorted({comparison.target for comparison in found}),
         "flow": {**vars(flow)},
+        "order": sorted(table, key=lambda name: (-table[name].rate, name)),
         "baselines": {name: preference_record(row) for name, row in table.items()},
         "warnings": [],
     }  # fmt: skip
@@ -89,7 +99,7 @@ def summary(results: Results, out: Path) -> dict[str, Any]:
         "watermark": results["watermark"], "rows": results["flow"]["rows"],
         "analysed": results["flow"]["analysed"], "warnings": results["warnings"],
         "baselines": {
-            name: {key: row[key] for key in keys} for name, row in results["baselines"].items()
+            name: {key: row[key] for key in keys} for name, row in ordered(results)
         },
     }  # fmt: skip
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from analysis.results import Results
+from analysis.results import Results, ordered
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +43,7 @@ def draw(figure: Callable[[Results], Figure], results: Results) -> dict[str, byt
 
 def forest(results: Results) -> Figure:
     """Rate per baseline: headline interval thick, naive interval thin and dashed below, 50 % dotted."""
-    rows = _by_effect(results)
+    rows = ordered(results)
     figure, axes = _canvas(7.2, 1.1 + 0.52 * len(rows))
     for place, (_, row) in enumerate(rows):
         low, high = (100 * bound for bound in row["ci"])
@@ -61,11 +61,6 @@ def forest(results: Results) -> Figure:
     legend = "thick: clustered interval    dashed: assumes independent answers"
     axes.set_title(legend, fontsize=7.5, color=GREY, loc="left")
     return figure
-
-
-def _by_effect(results: Results) -> list[tuple[str, dict[str, Any]]]:
-    """Baselines by rate, highest first; the one order of all panels."""
-    return sorted(results["baselines"].items(), key=lambda item: (-item[1]["rate"], item[0]))
 
 
 def _share_axis(axes: Axes, label: str) -> None:
@@ -90,7 +85,7 @@ def _watermark(figure: Figure, mark: str) -> None:
         0.5, 0.5, mark, ha="center", va="center", rotation=12, fontsize=26, color=SECOND,
         alpha=0.13, zorder=0,
     )  # fmt: skip
-    figure.text(0.995, 0.01, mark, ha="right", va="bottom", fontsize=7, color=SECOND)
+    figure.text(0.995, 0.995, mark, ha="right", va="top", fontsize=7, color=SECOND)
 
 
 def _encode(figure: Figure, kind: str) -> bytes:

@@ -40,7 +40,7 @@ def macro_stems(names: list[str]) -> dict[str, str]:
 def macros(results: Results) -> str:
     """`results.tex`: `\\newcommand` for every number of the main table and of the flow."""
     lines = [_header(results)]
-    for name, stem in macro_stems(list(results["baselines"])).items():
+    for name, stem in macro_stems(results["order"]).items():
         row = results["baselines"][name]
         lines += [_macro(stem + field, row["display"][key]) for field, key in _FIELDS.items()]
         lines += [_macro(stem + "Wins", str(row["k"])), _macro(stem + "Answers", str(row["n"]))]
@@ -53,7 +53,7 @@ def macros(results: Results) -> str:
 
 def preference_tex(results: Results) -> str:
     """The main table (booktabs); wants `results.tex` to be read first. Both shares of a row are printed."""
-    stems = macro_stems(list(results["baselines"]))
+    stems = macro_stems(results["order"])
     rows = [_row(name, stem) for name, stem in stems.items()]
     mark = f"\\textbf{{{escape(results['watermark'])}}} " if results["watermark"] else ""
     flow, level = results["flow"], f"{results['level'] * 100:g}"

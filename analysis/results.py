@@ -29,6 +29,11 @@ def read_results(path: Path) -> Results:
     return dict(results)
 
 
+def ordered(results: Results) -> list[tuple[str, dict[str, Any]]]:
+    """Comparisons by rate, highest first: the one order of all tables and panels."""
+    return [(name, results["baselines"][name]) for name in results["order"]]
+
+
 def versions() -> dict[str, str]:
     """Version of this product and of the libraries whose numbers and drawings it passes on."""
     return {name: metadata.version(name) for name in ("pace-study", *_LIBRARIES)}

@@ -9,7 +9,7 @@ import textwrap
 from dataclasses import dataclass
 from typing import Any
 
-from analysis.results import Results
+from analysis.results import Results, ordered
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
@@ -34,7 +34,7 @@ def preference_table(results: Results) -> Table:
             row["display"]["ci"], row["display"]["p_holm"], row["display"]["design_effect"],
             row["display"]["ci_naive"],
         )
-        for name, row in results["baselines"].items()
+        for name, row in ordered(results)
     )  # fmt: skip
     header = (
         "compared with", "answers", "baseline %", "target %", f"{level} CI", "p (Holm)",
@@ -53,9 +53,7 @@ def preference_note(results: Results) -> str:
         f"{flow['analysed']:,} answers of {flow['analysed_participants']} participants analysed; "
         f"{flow['rows']:,} rows read.",
     ]
-    notes += [
-        f"{name}: {flag}." for name, row in results["baselines"].items() for flag in row["flags"]
-    ]
+    notes += [f"{name}: {flag}." for name, row in ordered(results) for flag in row["flags"]]
     return " ".join(notes)
 
 
