@@ -107,7 +107,7 @@ def _shell_pieces(
     pieces = []
     for name, corners in shell_walls(room_size).items():
         label = FLOOR if name == "floor" else WALL
-        pieces.append((_instance(name, "shell", label, (0, 0, 0, 0), corners), corners))
+        pieces.append((_instance(name, "shell", label, (0.0, 0.0, 0.0, 0.0), corners), corners))
     return pieces
 
 

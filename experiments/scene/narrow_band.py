@@ -22,7 +22,7 @@ class Windows:
     shape: Int64[np.ndarray, "O 3"]
 
     @property
-    def start(self) -> Int64[np.ndarray, " O+1"]:
+    def start(self) -> Int64[np.ndarray, " _"]:
         """Where each box begins in the flat array; the last entry is the total size."""
         return np.concatenate([np.zeros(1, np.int64), np.cumsum(self.shape.prod(axis=1))])
 

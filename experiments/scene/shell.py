@@ -57,13 +57,13 @@ def shell_walls(room_size: tuple[float, float, float]) -> dict[str, Float[np.nda
     surfaces = {"floor": _quads(floor[None], np.array([0.0, 0, 1]))}
     for name in WALLS:
         frame = _WallFrame.of(name, room_size)
-        surfaces[f"wall_{name}"] = frame.rectangle((0, frame.length), (0, height), 0.0)
+        surfaces[f"wall_{name}"] = frame.rectangle((0.0, frame.length), (0.0, height), 0.0)
     return surfaces
 
 
 def _floor(layout: Layout) -> ShellPart:
     width, depth, _ = layout.size
-    x, y = _lines(0, width), _lines(0, depth)
+    x, y = _lines(0.0, width), _lines(0.0, depth)
     cells = [(a, b, c, d) for a, b in pairwise(x) for c, d in pairwise(y)]
     quads = np.array([[[a, c, 0], [b, c, 0], [b, d, 0], [a, d, 0]] for a, b, c, d in cells])
     corners = _quads(quads, np.array([0.0, 0, 1]))
@@ -85,7 +85,7 @@ def _wall(layout: Layout, wall: str) -> Iterator[ShellPart]:
             else _door(wall, frame, opening)
         )
     boxes = [
-        frame.box(interval, (-_SKIRTING_DEPTH, 0), (0, _SKIRTING_HEIGHT))
+        frame.box(interval, (-_SKIRTING_DEPTH, 0.0), (0.0, _SKIRTING_HEIGHT))
         for interval in _between_doors(frame.length, openings)
     ]
     yield _trim(wall, boxes, _WHITE, 0.85)
@@ -95,8 +95,8 @@ def _painted(
     layout: Layout, wall: str, frame: _WallFrame, openings: Sequence[Opening]
 ) -> ShellPart:
     """The wall's surface, a grid with the openings left out."""
-    u = _lines(0, frame.length, [edge for o in openings for edge in (o.u0, o.u1)])
-    z = _lines(0, layout.size[2], [edge for o in openings for edge in (o.z0, o.z1)])
+    u = _lines(0.0, frame.length, [edge for o in openings for edge in (o.u0, o.u1)])
+    z = _lines(0.0, layout.size[2], [edge for o in openings for edge in (o.z0, o.z1)])
     cells = [
         frame.rectangle((a, b), (c, d), 0.0)
         for a, b in pairwise(u)
@@ -136,8 +136,8 @@ def _door(wall: str, frame: _WallFrame, opening: Opening) -> Iterator[ShellPart]
     yield _trim(wall, frame.reveal((u0, u1), (z0, z1), set_back), _WHITE, 0.75)
     sides = [(u0 - _CASING_WIDTH, u0), (u1, u1 + _CASING_WIDTH)]
     over = z1 + _CASING_WIDTH
-    casings = [frame.box(side, (-_CASING_DEPTH, 0), (z0, over)) for side in sides]
-    casings.append(frame.box((u0, u1), (-_CASING_DEPTH, 0), (z1, over)))
+    casings = [frame.box(side, (-_CASING_DEPTH, 0.0), (z0, over)) for side in sides]
+    casings.append(frame.box((u0, u1), (-_CASING_DEPTH, 0.0), (z1, over)))
     yield _trim(wall, casings, _WHITE, 0.90)
     handle = [
         frame.box((u0 + 0.05, u0 + 0.09), (set_back - 0.012, set_back), (z0 + 0.92, z0 + 1.08)),
@@ -201,7 +201,8 @@ class _WallFrame:
 
     def at(self, u: float, w: float, z: float) -> Float[np.ndarray, "3"]:
         place: Float[np.ndarray, "3"] = self.origin + u * self.along + w * self.outward
-        return place + np.array([0, 0, z])
+        place[2] += z
+        return place
 
     def rectangle(self, u: Interval, z: Interval, w: float) -> Float[np.ndarray, "2 3 3"]:
         """Parallel to the wall, facing into the room."""

@@ -45,9 +45,8 @@ def _wood(rng: np.random.Generator) -> Float[np.ndarray, "s s 3"]:
     grain = grain[(y + 7 * board) % PIXELS, (x + offset) % PIXELS]
     joint = _joint(y % height) * 0.16 + _joint((x + shift) % length) * 0.16
     light = 1 + shade + grain - np.minimum(joint, 0.16)
-    coloured: Float[np.ndarray, "s s 3"] = light[..., None] * (
-        1 + warm[..., None] * np.array([1.0, 0.0, -1.0])
-    )
+    hue = 1 + warm[..., None] * np.array([1.0, 0.0, -1.0])
+    coloured: Float[np.ndarray, "s s 3"] = light[..., None] * hue
     return coloured
 
 

@@ -18,7 +18,10 @@ MARGIN = 0.2
 """How far the grid reaches beyond the walls and below the floor, metres."""
 TOP = 2.4
 """Height up to which the grid reaches, metres; above it the border values hold."""
+Axes = tuple[Float[np.ndarray, " X"], Float[np.ndarray, " Y"], Float[np.ndarray, " Z"]]
+
 BAND_CELLS = 2.0
+SWEEPS = 1
 """Half width of the band in which the distance to furniture is exact, in cells."""
 
 
@@ -65,7 +68,7 @@ def bake_volumes(
 
 
 def shell_distance(
-    room_size: tuple[float, float, float], axes: Sequence[Float[np.ndarray, " N"]]
+    room_size: tuple[float, float, float], axes: Axes
 ) -> tuple[Float32[np.ndarray, "X Y Z"], UInt8[np.ndarray, "X Y Z"]]:
     """Signed distance to floor and walls in closed form, and which of the two is nearer.
 
@@ -94,10 +97,9 @@ def _grid(
     return np.full(3, -below * cell), (nx, ny, nz)
 
 
-def _axes(
-    origin: Float[np.ndarray, "3"], shape: tuple[int, int, int], cell: float
-) -> list[Float[np.ndarray, " N"]]:
-    return [start + cell * np.arange(n) for start, n in zip(origin, shape, strict=True)]
+def _axes(origin: Float[np.ndarray, "3"], shape: tuple[int, int, int], cell: float) -> Axes:
+    x, y, z = (start + cell * np.arange(n) for start, n in zip(origin, shape, strict=True))
+    return x, y, z
 
 
 def _furniture(
@@ -132,8 +134,9 @@ def _furniture(
         on_step(0.4 + 0.4 * (index + 1) / len(solids))
     missing = ~np.isfinite(total)
     close = np.abs(total) <= 0.9 * cell
-    nearest[missing] = _carry(close, nearest, missing)
-    total[missing] = _distances(planar, nearest, missing, np.zeros(3, np.int64), cell)
+    total[missing], nearest[missing] = _spread(
+        close, nearest, missing, np.zeros(3, np.int64), planar, cell
+    )
     label = np.array([solid.label for solid in solids], dtype=np.uint8)[owner[nearest]]
     return total, label
 
@@ -168,8 +171,9 @@ def _signed_object(
     inside = _inside(corners, low, distance.shape, cell)
     deep = inside & ~np.isfinite(distance)
     if deep.any():
-        triangle[deep] = _carry(distance <= 0.9 * cell, triangle, deep)
-        distance[deep] = _distances(planar, triangle, deep, low, cell)
+        distance[deep], triangle[deep] = _spread(
+            distance <= 0.9 * cell, triangle, deep, low, planar, cell
+        )
     return np.where(inside, -distance, distance), triangle
 
 
@@ -206,30 +210,45 @@ def _merge(
     nearest[box][smaller] = triangle[smaller]
 
 
-def _carry(
+def _spread(
     known: Bool[np.ndarray, "x y z"],
     triangle: Int64[np.ndarray, "x y z"],
     wanted: Bool[np.ndarray, "x y z"],
-) -> Int64[np.ndarray, " W"]:
-    """Feature transform: the triangle of the nearest known node, for each wanted node."""
+    low: Int64[np.ndarray, "3"],
+    planar: PlanarTriangles,
+    cell: float,
+) -> tuple[Float32[np.ndarray, " W"], Int64[np.ndarray, " W"]]:
+    """Distance and nearest triangle at the wanted nodes, carried over from the known ones.
+
+    The feature transform gives each node the triangle of the nearest known node. That node is
+    near the nearest point of the surface, but not always on the right triangle: the triangles that
+    the six neighbours ended up with are tried as well.
+    """
     i, j, k = distance_transform_edt(~known, return_distances=False, return_indices=True)
-    carried: Int64[np.ndarray, " W"] = triangle[i[wanted], j[wanted], k[wanted]]
-    return carried
+    carried = triangle[i, j, k]
+    node = np.argwhere(wanted)
+    best, found = _distances(planar, node + low, carried[wanted], cell), carried[wanted]
+    for _ in range(SWEEPS):
+        carried[wanted] = found
+        for step in (*np.eye(3, dtype=int), *-np.eye(3, dtype=int)):
+            beside = np.clip(node + step, 0, np.array(known.shape) - 1)
+            other = carried[tuple(beside.T)]
+            new = np.flatnonzero(other != found)
+            distance = _distances(planar, node[new] + low, other[new], cell)
+            closer = distance < best[new]
+            best[new[closer]], found[new[closer]] = distance[closer], other[new[closer]]
+    return best, found
 
 
 def _distances(
     planar: PlanarTriangles,
-    triangle: Int64[np.ndarray, "x y z"],
-    wanted: Bool[np.ndarray, "x y z"],
-    low: Int64[np.ndarray, "3"],
+    node: Int64[np.ndarray, "N 3"],
+    triangle: Int64[np.ndarray, " N"],
     cell: float,
-) -> Float32[np.ndarray, " W"]:
-    """Exact distance from each wanted node to the triangle noted there."""
-    node = np.argwhere(wanted) + low
-    index = triangle[wanted]
-    parts = range(0, len(node), 300_000)
-    found = [
-        planar.distance((node[a : a + 300_000] * cell).astype(np.float32), index[a : a + 300_000])
-        for a in parts
-    ]
-    return np.concatenate(found)
+) -> Float32[np.ndarray, " N"]:
+    """Exact distance from each node to its triangle."""
+    found = np.zeros(len(node), dtype=np.float32)
+    for start in range(0, len(node), 300_000):
+        part = slice(start, start + 300_000)
+        found[part] = planar.distance((node[part] * cell).astype(np.float32), triangle[part])
+    return found

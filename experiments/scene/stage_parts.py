@@ -1,0 +1,159 @@
+"""The drawn room: shell and furniture with colours, textures and occlusion, ready for the renderer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from experiments.scene.layout import Layout
+from experiments.scene.objects import MaterialPart, PlacedObject
+from experiments.scene.occlusion import Occlusion, Surface, bake_occlusion
+from experiments.scene.refine import refine
+from experiments.scene.shell import shell_parts
+from renderer.stage import StagePart
+
+HIDEABLE = 0.85
+"""Objects whose top is above this (metres) may be hidden in a view, and form groups."""
+LONGEST_EDGE = 0.16
+"""Furniture triangles are cut to edges of at most this, metres, before occlusion is baked."""
+SATURATION = 0.72
+LIFT = 0.8
+"""Exponent on catalogue colours, which are too dark for the light they will stand in."""
+BRIGHTEST, BRIGHTEST_TEXTURE = 0.82, 0.86
+
+
+def room_parts(
+    layout: Layout,
+    objects: Sequence[PlacedObject],
+    on_step: Callable[[float], None] = lambda share: None,
+) -> tuple[StagePart, ...]:
+    """Stage parts of a furnished room: shell first, then the objects in their order.
+
+    Groups: `floor`; `wall:n` and so on for a wall with all that belongs to it; `object:<id>` for an
+    object that may hide the body, with everything that stands on it; `room` for the rest.
+    """
+    drafts = [*_shell_drafts(layout), *_object_drafts(objects)]
+    removable = sorted({d.group for d in drafts if d.group.startswith("object:")})
+    surfaces = [Surface(d.corners, d.normals, d.group) for d in drafts]
+    baked = bake_occlusion(surfaces, removable, on_step=on_step)
+    return tuple(_finished(draft, light) for draft, light in zip(drafts, baked, strict=True))
+
+
+@dataclass(frozen=True)
+class _Draft:
+    """A stage part before its occlusion is known."""
+
+    corners: Float[np.ndarray, "F 3 3"]
+    normals: Float[np.ndarray, "F 3 3"]
+    colours: Float[np.ndarray, "F 3 3"]
+    uv: Float[np.ndarray, "F 3 2"] | None
+    texture: UInt8[np.ndarray, "h w 3"] | None
+    instance: str
+    group: str
+    wall: str | None
+    occlusion: float | None = None
+
+
+def _finished(draft: _Draft, light: Occlusion) -> StagePart:
+    constant = draft.occlusion
+    factor = light.factor if constant is None else np.full_like(light.factor, constant)
+    return StagePart(
+        corners=draft.corners,
+        normals=draft.normals,
+        colours=draft.colours,
+        occlusion=factor,
+        instance=draft.instance,
+        group=draft.group,
+        uv=draft.uv,
+        texture=draft.texture,
+        wall=draft.wall,
+        released=light.released if constant is None else {},
+    )
+
+
+def _shell_drafts(layout: Layout) -> list[_Draft]:
+    drafts = []
+    for part in shell_parts(layout):
+        material = part.material
+        group = "floor" if part.wall is None else f"wall:{part.wall}"
+        colours = np.broadcast_to(np.float32(material.colour), material.corners.shape)
+        drafts.append(
+            _Draft(
+                *(material.corners, material.normals, np.ascontiguousarray(colours)),
+                *(material.uv, material.texture, part.instance, group, part.wall, part.occlusion),
+            )
+        )
+    return drafts
+
+
+def _object_drafts(objects: Sequence[PlacedObject]) -> list[_Draft]:
+    groups = object_groups(objects)
+    drafts = []
+    for placed in objects:
+        lifted = placed.asset.startswith("pack:")
+        for material in placed.parts:
+            corners, normals, colours, uv = _refined(material, lifted)
+            texture = None if material.texture is None else displayed_texture(material.texture)
+            place = (placed.id, groups[placed.id], placed.wall)
+            drafts.append(_Draft(corners, normals, colours, uv, texture, *place))
+    return drafts
+
+
+def object_groups(objects: Sequence[PlacedObject]) -> dict[str, str]:
+    """The group of each object, by id. What stands on something follows its support."""
+    groups: dict[str, str] = {}
+    for placed in objects:
+        below = groups.get(placed.on or "", "room")
+        top = float(placed.triangles()[..., 2].max())
+        if below != "room":
+            groups[placed.id] = below
+        elif placed.wall is not None:
+            groups[placed.id] = f"wall:{placed.wall}"
+        else:
+            groups[placed.id] = f"object:{placed.id}" if top > HIDEABLE else "room"
+    return groups
+
+
+def _refined(
+    material: MaterialPart, lifted: bool
+) -> tuple[
+    Float[np.ndarray, "F 3 3"],
+    Float[np.ndarray, "F 3 3"],
+    Float[np.ndarray, "F 3 3"],
+    Float[np.ndarray, "F 3 2"] | None,
+]:
+    """Corners, normals, colours and texture coordinates, cut to small triangles."""
+    colours = material.vertex_colours
+    if colours is None:
+        colours = np.broadcast_to(np.float32(material.colour), material.corners.shape)
+    if material.texture is None:
+        colours = displayed_colour(colours, lifted)
+    channels = [material.corners, material.normals, colours]
+    channels += [] if material.uv is None else [material.uv]
+    fine = refine(np.concatenate(channels, axis=2).astype(np.float32), LONGEST_EDGE)
+    normals = fine[..., 3:6] / np.maximum(np.linalg.norm(fine[..., 3:6], axis=2)[..., None], 1e-6)
+    uv = None if material.uv is None else fine[..., 9:11]
+    return fine[..., :3], normals, fine[..., 6:9], uv
+
+
+def displayed_colour(colour: Float[np.ndarray, "*n 3"], lifted: bool) -> Float[np.ndarray, "*n 3"]:
+    """An authored sRGB colour as it is drawn: less saturated than the body, never clipping."""
+    lighter = colour**LIFT if lifted else colour
+    return np.minimum(_muted(lighter), BRIGHTEST).astype(np.float32)
+
+
+def displayed_texture(texture: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3"]:
+    """The same for a texture."""
+    muted = np.clip(_muted(texture / 255.0), 0, BRIGHTEST_TEXTURE)
+    pixels: UInt8[np.ndarray, "h w 3"] = np.round(255 * muted).astype(np.uint8)
+    return pixels
+
+
+def _muted(colour: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+    """Towards the grey of the same luma (Rec. 709)."""
+    grey = (colour @ np.array([0.2126, 0.7152, 0.0722]))[..., None]
+    muted: Float[np.ndarray, "*n 3"] = grey + SATURATION * (colour - grey)
+    return muted
