@@ -1,0 +1,171 @@
+"""Furnishing: turn a layout into placed objects, triangles in the room's frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from experiments.scene.layout import Colour, Item, Layout
+from experiments.scene.normals import creased_normals
+from experiments.scene.objects import MaterialPart, PlacedObject
+from experiments.scene.pack import Pack, Piece, default_pack
+from experiments.scene.parametric import make_shape
+from experiments.scene.scene import MPCAT40
+from experiments.scene.settle import settled_height
+from experiments.scene.tops import refine_tops
+from renderer.files import InputError
+
+SOFT_ASSETS = frozenset({"shape:cushion", "shape:blanket", "pack:teddy_bear_51"})
+"""Things that may sink some centimetres into what they lie on."""
+
+
+def furnish(layout: Layout, pack: Pack | None = None) -> tuple[PlacedObject, ...]:
+    """Make and place every object of a layout, in its order.
+
+    Objects stand on the floor, hang at their given height, or are settled on their support by rays
+    straight down. Raises InputError for an unknown piece or shape, or when the support is missed.
+    """
+    pack = pack or default_pack()
+    placed: dict[str, PlacedObject] = {}
+    for item in layout.items:
+        placed[item.id] = place(item, placed, pack, layout.name)
+    return tuple(placed.values())
+
+
+def place(
+    item: Item, placed: dict[str, PlacedObject], pack: Pack, source: object = "layout"
+) -> PlacedObject:
+    """Make one object and stand it where its item says; its support must be in `placed`."""
+    bodies = _own_frame(item, pack, source)
+    turn = _yaw_matrix(item.yaw)
+    points = np.concatenate([body.corners.reshape(-1, 3) for body in bodies]) @ turn.T
+    z = _height(item, points, placed, source)
+    shift = np.array([item.x, item.y, z])
+    parts = tuple(
+        MaterialPart(
+            corners=body.corners @ turn.T + shift,
+            normals=body.normals @ turn.T,
+            colour=body.colour,
+            uv=body.uv,
+            texture=body.texture,
+            vertex_colours=body.vertex_colours,
+        )
+        for body in bodies
+    )
+    return PlacedObject(
+        id=item.id,
+        asset=item.asset,
+        label=item.label,
+        x=item.x,
+        y=item.y,
+        z=z,
+        yaw_deg=item.yaw,
+        parts=parts,
+        on=item.on,
+        wall=item.wall,
+        soft=item.asset in SOFT_ASSETS or MPCAT40[item.label] == "cushion",
+    )
+
+
+@dataclass(frozen=True)
+class _Body:
+    """One material of an object in its own frame, scaled."""
+
+    corners: Float[np.ndarray, "F 3 3"]
+    normals: Float[np.ndarray, "F 3 3"]
+    colour: Colour
+    uv: Float[np.ndarray, "F 3 2"] | None
+    texture: UInt8[np.ndarray, "h w 3"] | None
+    vertex_colours: Float[np.ndarray, "F 3 3"] | None
+
+
+def _own_frame(item: Item, pack: Pack, source: object) -> tuple[_Body, ...]:
+    """Piece or shape, scaled, with normals, large tops refined, tinted."""
+    if item.piece is not None:
+        piece = pack.piece(item.piece)
+        scale = _scale(item, piece, source)
+        bodies = tuple(_Body(p.corners * scale, p.corners, p.colour, p.uv, p.texture, None) for p in piece.parts)  # fmt: skip
+    else:
+        shapes = make_shape(str(item.shape), item.params, f"{source}: {item.id}")
+        bodies = tuple(
+            _Body(p.corners * item.scale, p.corners, p.colour, p.uv, p.texture, p.vertex_colours)
+            for p in shapes
+        )
+    bodies = _with_normals(bodies)
+    refined = refine_tops(tuple((b.corners, b.normals, b.uv, b.vertex_colours) for b in bodies))
+    bodies = tuple(
+        replace(body, corners=corners, normals=normals, uv=uv, vertex_colours=colours)
+        for body, (corners, normals, uv, colours) in zip(bodies, refined, strict=True)
+    )
+    return bodies if item.tint is None else _tinted(bodies, item.tint)
+
+
+def _scale(item: Item, piece: Piece, source: object) -> Float[np.ndarray, " 3"]:
+    """The item's scale; a wanted seat height sets the third factor."""
+    scale = np.array(item.scale)
+    if item.seat is not None:
+        if piece.seat is None:
+            raise InputError(source, f"{item.id}.seat", item.seat, "a piece that has a seat")
+        scale[2] = item.seat / piece.seat
+    return scale
+
+
+def _with_normals(bodies: tuple[_Body, ...]) -> tuple[_Body, ...]:
+    """Creased normals over the whole object, so that shading runs across material borders."""
+    normals = creased_normals(np.concatenate([body.corners for body in bodies]))
+    starts = np.cumsum([0, *(len(body.corners) for body in bodies)])
+    return tuple(
+        replace(body, normals=normals[start:stop])
+        for body, start, stop in zip(bodies, starts[:-1], starts[1:], strict=True)
+    )
+
+
+def _height(
+    item: Item,
+    points: Float[np.ndarray, "N 3"],
+    placed: dict[str, PlacedObject],
+    source: object,
+) -> float:
+    """Height of the base: given, settled on the support, or the floor."""
+    if item.z is not None:
+        return item.z
+    if item.on is None:
+        return 0.0
+    width, depth, _ = np.ptp(points, axis=0)
+    triangles = placed[item.on].triangles()
+    height = settled_height(triangles, item.x, item.y, (float(width), float(depth)))
+    if np.isnan(height):
+        raise InputError(source, f"{item.id}.on", item.on, "a support under the object's middle")
+    return height
+
+
+def _tinted(bodies: tuple[_Body, ...], tint: Colour) -> tuple[_Body, ...]:
+    """Give the tint to the material with the largest surface and to all of its colour.
+
+    A textured material keeps its pattern: its brightness is kept relative to its mean.
+    """
+    area = [
+        np.linalg.norm(np.cross(b.corners[:, 1] - b.corners[:, 0], b.corners[:, 2] - b.corners[:, 0]), axis=1).sum()
+        for b in bodies
+    ]  # fmt: skip
+    main = bodies[int(np.argmax(area))]
+    return tuple(_recoloured(body, tint) if _alike(body, main) else body for body in bodies)
+
+
+def _alike(body: _Body, main: _Body) -> bool:
+    return body is main or (body.texture is None and body.colour == main.colour)
+
+
+def _recoloured(body: _Body, tint: Colour) -> _Body:
+    if body.texture is None:
+        return replace(body, colour=tint)
+    grey = body.texture.astype(float).mean(-1, keepdims=True)
+    coloured = np.clip(grey / grey.mean() * np.array(tint), 0.02, 0.86)
+    return replace(body, texture=np.round(255 * coloured).astype(np.uint8))
+
+
+def _yaw_matrix(degrees: float) -> Float[np.ndarray, "3 3"]:
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
