@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from experiments.scene.layout import Layout
+from experiments.scene.furnish import furnish
+from experiments.scene.layout import Layout, read_layout
 from experiments.scene.objects import MaterialPart, PlacedObject
 from experiments.scene.occlusion import Occlusion, Surface, bake_occlusion
+from experiments.scene.progress import progress_bar
 from experiments.scene.refine import refine
+from experiments.scene.scene_folder import is_scene_folder, read_parts
 from experiments.scene.shell import shell_parts
 from renderer.stage import StagePart
 
@@ -23,6 +27,18 @@ SATURATION = 0.72
 LIFT = 0.8
 """Exponent on catalogue colours, which are too dark for the light they will stand in."""
 BRIGHTEST, BRIGHTEST_TEXTURE = 0.82, 0.86
+
+
+def stage_parts(name_or_dir: str | Path) -> tuple[StagePart, ...]:
+    """The drawn parts of a room of the project, a layout file (.toml) or a scene folder.
+
+    Occlusion is baked the first time, a few seconds, and kept. Raises InputError.
+    """
+    if is_scene_folder(name_or_dir):
+        return read_parts(Path(name_or_dir))
+    layout = read_layout(name_or_dir)
+    with progress_bar(f"Lighting {layout.name}") as on_step:
+        return room_parts(layout, furnish(layout), on_step)
 
 
 def room_parts(
@@ -79,11 +95,18 @@ def _shell_drafts(layout: Layout) -> list[_Draft]:
     for part in shell_parts(layout):
         material = part.material
         group = "floor" if part.wall is None else f"wall:{part.wall}"
-        colours = np.broadcast_to(np.float32(material.colour), material.corners.shape)
+        colours = np.broadcast_to(np.array(material.colour, np.float32), material.corners.shape)
         drafts.append(
             _Draft(
-                *(material.corners, material.normals, np.ascontiguousarray(colours)),
-                *(material.uv, material.texture, part.instance, group, part.wall, part.occlusion),
+                corners=material.corners,
+                normals=material.normals,
+                colours=np.ascontiguousarray(colours),
+                uv=material.uv,
+                texture=material.texture,
+                instance=part.instance,
+                group=group,
+                wall=part.wall,
+                occlusion=part.occlusion,
             )
         )
     return drafts
@@ -128,7 +151,7 @@ def _refined(
     """Corners, normals, colours and texture coordinates, cut to small triangles."""
     colours = material.vertex_colours
     if colours is None:
-        colours = np.broadcast_to(np.float32(material.colour), material.corners.shape)
+        colours = np.broadcast_to(np.array(material.colour, np.float32), material.corners.shape)
     if material.texture is None:
         colours = displayed_colour(colours, lifted)
     channels = [material.corners, material.normals, colours]
@@ -142,7 +165,8 @@ def _refined(
 def displayed_colour(colour: Float[np.ndarray, "*n 3"], lifted: bool) -> Float[np.ndarray, "*n 3"]:
     """An authored sRGB colour as it is drawn: less saturated than the body, never clipping."""
     lighter = colour**LIFT if lifted else colour
-    return np.minimum(_muted(lighter), BRIGHTEST).astype(np.float32)
+    shown: Float[np.ndarray, "*n 3"] = np.minimum(_muted(lighter), BRIGHTEST).astype(np.float32)
+    return shown
 
 
 def displayed_texture(texture: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3"]:

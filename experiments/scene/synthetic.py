@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from experiments.scene.baking import assemble
+from experiments.scene.assembly import assemble
 from experiments.scene.objects import MaterialPart, PlacedObject
 from experiments.scene.scene import MPCAT40, Scene
 
