@@ -246,4 +246,4 @@ def _half_pronated(
     direction = unit(bone)
     twist = np.outer(relative @ direction, direction)
     share = np.full(len(arm), 0.5)
-    return arm @ to_matrix(slerp(np.zeros_like(twist), twist, share))
+    return np.asarray(arm @ to_matrix(slerp(np.zeros_like(twist), twist, share)))

@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Float, Integer
 
 from experiments.body.embedded import load_body
+from experiments.body.measures import body_measures
 from experiments.body.model import BodyModel
 from experiments.motion.capture import INDEX
 from experiments.motion.motion import Motion
@@ -30,9 +31,13 @@ class Figure:
     """Vertices of the left and of the right sole."""
     ankle_height: float
     ball: Float[np.ndarray, "3"]
-    """From the ankle joint to the ground point under the ball of the left foot (x: mirror for right)."""
+    """From the ankle joint to the toe joint of the left foot (for the right one negate x)."""
     heel: Float[np.ndarray, "3"]
-    """The same for the heel."""
+    """From the ankle joint to the ground point under the heel of the left foot."""
+    seat_offset: float
+    """Height of the hip centre above a hard seat."""
+    thigh_front: float
+    """From the thigh's axis to its skin, in front, three quarters of the way to the knee."""
 
     @property
     def leg(self) -> tuple[float, float]:
@@ -81,8 +86,6 @@ def measure(body: BodyModel) -> Figure:
     points = rest[body.regions["left_sole"]]
     ankle = joints[INDEX["left_ankle"]]
     ground = float(points[:, 1].min())
-    ball_z = float(joints[INDEX["left_foot"]][2])
-    ball_x = float(points[np.abs(points[:, 2] - ball_z) < 0.03, 0].mean())
     back = points[points[:, 2] < points[:, 2].min() + 0.03]
     heel = np.array([back[:, 0].mean(), ground, points[:, 2].min() + 0.01])
     return Figure(
@@ -90,9 +93,18 @@ def measure(body: BodyModel) -> Figure:
         rest_joints=joints,
         soles=(soles[0], soles[1]),
         ankle_height=float(ankle[1] - ground),
-        ball=np.array([ball_x, ground, ball_z]) - ankle,
+        ball=joints[INDEX["left_foot"]] - ankle,
         heel=heel - ankle,
+        seat_offset=body_measures(body).seat_offset,
+        thigh_front=_thigh_front(rest, joints),
     )
+
+
+def _thigh_front(rest: Float[np.ndarray, "V 3"], joints: Float[np.ndarray, "22 3"]) -> float:
+    hip, knee = joints[INDEX["left_hip"]], joints[INDEX["left_knee"]]
+    centre = hip + 0.74 * (knee - hip)
+    near = (np.abs(rest[:, 1] - centre[1]) < 0.03) & (np.abs(rest[:, 0] - centre[0]) < 0.05)
+    return float(rest[near, 2].max() - centre[2])
 
 
 def surface(

@@ -1,0 +1,118 @@
+"""The library: default motions by name, built for any embedded body and cached."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+
+from experiments.body.embedded import BODY_FILE
+from experiments.cache import cache_path
+from experiments.motion import recipes
+from experiments.motion.figure import Figure, figure_of
+from experiments.motion.motion import Motion, read_motion, write_motion
+from experiments.motion.resample import window
+from renderer.files import InputError, file_sha256, value_sha256
+
+AUTHORED = "authored key poses"
+STEPS = "DeepMimic clips of the package pybullet (steps)"
+
+
+@dataclasses.dataclass(frozen=True)
+class MotionSpec:
+    """One motion of the library and what it asks of a place."""
+
+    motion_id: str
+    label: str
+    source: str
+    build: Callable[[Figure], Motion]
+    highlight_s: float
+    """The moment of the interaction: what a shorter cut is centred on."""
+    contact: tuple[str, ...] = ("floor",)
+    """mpcat40 classes of what the person touches, best first."""
+    seat_height: float | None = None
+    """Height of the seat or bed the clip was authored for, metres."""
+    surface_height: float | None = None
+    """Height of the table top or shelf that the hands go to, metres."""
+
+
+def default_motions() -> tuple[MotionSpec, ...]:
+    """The motions every installation has, in a fixed order: pybullet's clips and authored ones only."""
+    return _DEFAULT
+
+
+def load_motion(motion_id: str, body_name: str = "male_slim") -> Motion:
+    """A motion of the library on an embedded body; built on first use, then read from the cache.
+
+    Raises `InputError` for an unknown motion or body.
+    """
+    spec = find_spec(motion_id)
+    target = cache_path("motions", _recipe_hash(spec.motion_id, body_name), ".npz")
+    if not target.is_file():
+        motion = spec.build(figure_of(body_name))
+        named = dataclasses.replace(
+            motion, motion_id=spec.motion_id, label=spec.label, source=spec.source, body=body_name
+        )
+        write_motion(named, target)
+    return read_motion(target)
+
+
+def find_spec(motion_id: str) -> MotionSpec:
+    """The entry of that name. Raises `InputError` listing the names there are."""
+    for spec in _DEFAULT:
+        if spec.motion_id == motion_id:
+            return spec
+    names = ", ".join(spec.motion_id for spec in _DEFAULT)
+    raise InputError("motion library", "motion", motion_id, f"one of {names}")
+
+
+def trim(motion: Motion, seconds: float) -> Motion:
+    """A cut of that length around the motion's moment of interaction, or around its middle if unknown.
+
+    Time stamps are kept, so a cut can be cut again around the same moment.
+    """
+    wanted = round(seconds * motion.fps)
+    if wanted < 2:
+        raise InputError(motion.motion_id, "seconds", seconds, "two frames or more")
+    if wanted >= motion.n_frames:
+        return motion
+    known = {spec.motion_id: spec.highlight_s for spec in _DEFAULT}
+    middle = float(motion.times[[0, -1]].mean())
+    centre = int(np.searchsorted(motion.times, known.get(motion.motion_id, middle)))
+    start = int(np.clip(centre - wanted // 2, 0, motion.n_frames - wanted))
+    cut = window(motion, start, start + wanted)
+    return dataclasses.replace(cut, times=motion.times[start : start + wanted])
+
+
+@lru_cache(maxsize=64)
+def _recipe_hash(motion_id: str, body_name: str) -> str:
+    """Changes with the code that builds motions, the body file and the package the steps come from."""
+    code = {path.name: file_sha256(path) for path in sorted(Path(__file__).parent.glob("*.py"))}
+    versions = {name: metadata.version(name) for name in ("pybullet", "scipy", "numpy")}
+    return value_sha256([motion_id, body_name, code, file_sha256(BODY_FILE), versions])
+
+
+_SEAT = ("chair", "sofa", "stool", "seating")
+
+_DEFAULT: tuple[MotionSpec, ...] = (
+    MotionSpec("walk_straight", "walk a few steps and stop", f"{STEPS}; {AUTHORED}",
+               recipes.walk_straight, 2.6),
+    MotionSpec("walk_turn_right", "walk, turn right, walk on and stop", f"{STEPS}; {AUTHORED}",
+               recipes.walk_turn_right, 3.0),
+    MotionSpec("walk_turn_left", "walk, turn left, walk on and stop", f"{STEPS}, mirrored; {AUTHORED}",
+               recipes.walk_turn_left, 3.0),
+    MotionSpec("walk_turn_sit", "walk, turn and sit down on a chair", f"{STEPS}; {AUTHORED}",
+               recipes.walk_turn_sit, 5.5, _SEAT, 0.45),
+    MotionSpec("sit_stay_stand", "sit down, look about, stand up", AUTHORED,
+               recipes.sit_stay_stand, 3.4, _SEAT, 0.45),
+    MotionSpec("reach_forward", "reach for something on a shelf", AUTHORED,
+               recipes.reach_forward, 2.4, ("shelving", "cabinet", "floor"), None, 1.40),
+    MotionSpec("lean_table", "lean on a table with both hands", AUTHORED,
+               recipes.lean_table, 3.2, ("table", "counter"), None, 0.75),
+    MotionSpec("stand_idle_look", "stand at ease and look about", AUTHORED,
+               recipes.stand_idle_look, 4.0),
+)  # fmt: skip
