@@ -1,0 +1,142 @@
+// @ts-check
+/**
+ * Watches one clip being watched. `ended` proves nothing, as seeking to the end fires it; what counts
+ * is the union of played stretches, at normal speed, in a visible page, in about real time.
+ */
+
+const COVERED = 0.95;
+const WALL = 0.9;
+
+/** Total length of the stretches. @param {TimeRanges} ranges */
+export function playedSeconds(ranges) {
+  let total = 0;
+  for (let i = 0; i < ranges.length; i += 1) total += ranges.end(i) - ranges.start(i);
+  return total;
+}
+
+export class ClipWatch {
+  /**
+   * @param {HTMLVideoElement} video
+   * @param {(kind: string, detail: object) => void} report
+   * @param {{changed: () => void, failed: () => void, hidden: () => void}} page
+   */
+  constructor(video, report, page) {
+    this.video = video;
+    this.report = report;
+    this.page = page;
+    this.plays = 0;
+    this.seen = false;
+    this.spoiled = false;
+    this.stalls = 0;
+    this.wallMs = 0;
+    this.startedAt = 0;
+    this.fastest = 1;
+    this.listen();
+  }
+
+  get playing() {
+    return !this.video.paused && !this.video.ended;
+  }
+
+  get loaded() {
+    return this.video.readyState >= 4 || this.plays > 0;
+  }
+
+  get duration() {
+    return this.video.duration || Number(this.video.dataset.duration);
+  }
+
+  covered() {
+    return Math.min(1, playedSeconds(this.video.played) / this.duration);
+  }
+
+  dropped() {
+    return this.video.getVideoPlaybackQuality?.().droppedVideoFrames ?? null;
+  }
+
+  listen() {
+    const on = (name, handler) => this.video.addEventListener(name, handler);
+    on("canplaythrough", () => this.page.changed());
+    on("timeupdate", () => this.page.changed());
+    on("ratechange", () => this.fast());
+    on("waiting", () => this.stalled());
+    on("pause", () => this.addWall());
+    on("ended", () => this.complete());
+    on("error", () => this.error());
+    document.addEventListener("visibilitychange", () => this.visibility());
+    if (this.video.error) this.error();
+  }
+
+  /** Resolves when the clip can run to its end, so that two clips start in step. */
+  ready() {
+    if (this.video.readyState >= 4) return Promise.resolve();
+    this.video.load();
+    return new Promise((resolve, reject) => {
+      this.video.addEventListener("canplaythrough", resolve, { once: true });
+      this.video.addEventListener("error", reject, { once: true });
+    });
+  }
+
+  async play() {
+    this.stop();
+    this.video.playbackRate = 1;
+    this.video.currentTime = 0;
+    this.fastest = 1;
+    this.wallMs = 0;
+    this.spoiled = document.hidden;
+    this.plays += 1;
+    await this.video.play();
+    this.startedAt = performance.now();
+    this.report("play", { view: this.plays });
+    this.page.changed();
+  }
+
+  stop() {
+    if (this.playing) this.video.pause();
+  }
+
+  addWall() {
+    if (this.startedAt) this.wallMs += performance.now() - this.startedAt;
+    this.startedAt = 0;
+  }
+
+  complete() {
+    this.addWall();
+    const proof = {
+      view: this.plays,
+      covered: Math.round(1000 * this.covered()) / 1000,
+      rate: this.fastest,
+      hidden: this.spoiled,
+      wall_ms: Math.round(this.wallMs),
+    };
+    const sound = proof.covered >= COVERED && proof.rate === 1 && !proof.hidden;
+    this.seen ||= sound && proof.wall_ms >= 1000 * WALL * this.duration;
+    this.report("complete", { ...proof, dropped: this.dropped() });
+    this.page.changed();
+  }
+
+  fast() {
+    this.fastest = Math.max(this.fastest, this.video.playbackRate);
+  }
+
+  stalled() {
+    if (!this.playing) return;
+    this.stalls += 1;
+    this.report("stall", { view: this.plays, clip_ms: Math.round(1000 * this.video.currentTime) });
+  }
+
+  visibility() {
+    if (document.hidden && this.playing) {
+      this.spoiled = true;
+      this.video.pause();
+      this.report("hidden", { view: this.plays });
+    } else if (!document.hidden && this.spoiled) {
+      this.page.hidden();
+    }
+  }
+
+  error() {
+    this.report("error", { code: this.video.error?.code ?? null });
+    this.page.failed();
+  }
+}
