@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -50,8 +51,9 @@ def fit_crossed(cells: Cells, design: Float[np.ndarray, "C B"] | None = None) ->
     """
     model = _Laplace(cells, np.ones((len(cells.wins), 1)) if design is None else design)
     start = np.concatenate([model.pooled_fixed_effects(), [0.5, 0.5]])
-    bounds = [(None, None)] * model.fixed + [(0.0, 20.0)] * 2
-    options = {"ftol": 1e-13, "gtol": 1e-6, "maxiter": 200}
+    low = np.r_[np.full(model.fixed, -np.inf), 0.0, 0.0]
+    bounds = optimize.Bounds(low, np.r_[np.full(model.fixed, np.inf), 20.0, 20.0])
+    options: Any = {"ftol": 1e-13, "gtol": 1e-6, "maxiter": 200}
     rough = optimize.minimize(
         model.deviance, start, method="L-BFGS-B", bounds=bounds, options=options
     )
