@@ -21,7 +21,7 @@ from renderer.stage import StagePart
 
 HIDEABLE = 0.85
 """Objects whose top is above this (metres) may be hidden in a view, and form groups."""
-LONGEST_EDGE = 0.16
+LONGEST_EDGE = 0.3
 """Furniture triangles are cut to edges of at most this, metres, before occlusion is baked."""
 SATURATION = 0.72
 LIFT = 0.8
@@ -157,9 +157,20 @@ def _refined(
     channels = [material.corners, material.normals, colours]
     channels += [] if material.uv is None else [material.uv]
     fine = refine(np.concatenate(channels, axis=2).astype(np.float32), LONGEST_EDGE)
-    normals = fine[..., 3:6] / np.maximum(np.linalg.norm(fine[..., 3:6], axis=2)[..., None], 1e-6)
     uv = None if material.uv is None else fine[..., 9:11]
-    return fine[..., :3], normals, fine[..., 6:9], uv
+    return fine[..., :3], _unit(fine[..., 3:6], fine[..., :3]), fine[..., 6:9], uv
+
+
+def _unit(
+    normals: Float[np.ndarray, "F 3 3"], corners: Float[np.ndarray, "F 3 3"]
+) -> Float[np.ndarray, "F 3 3"]:
+    """Normals of length one; that of the triangle where a mesh has none."""
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat = np.where(np.linalg.norm(flat, axis=1, keepdims=True) > 1e-12, flat, [0.0, 0.0, 1.0])
+    length = np.linalg.norm(normals, axis=2, keepdims=True)
+    chosen = np.where(length > 0.1, normals, flat[:, None])
+    unit = chosen / np.linalg.norm(chosen, axis=2, keepdims=True)
+    return np.asarray(unit, dtype=np.float32)
 
 
 def displayed_colour(colour: Float[np.ndarray, "*n 3"], lifted: bool) -> Float[np.ndarray, "*n 3"]:
