@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from experiments.placement.candidates import Starts, class_match
 from experiments.placement.errors import NoAdmissibleStart, OptimisationFailed
 from experiments.placement.placement import Placement
 from experiments.placement.problem import Problem
@@ -18,23 +19,35 @@ from experiments.placement.solver import Fit, altered_bodies
 
 
 def best_fit(problem: Problem, fits: Sequence[Fit]) -> Fit:
-    """The fit of lowest energy that does not leave the body deep inside something.
+    """The fit of lowest energy that touches what it expects and is not deep inside something.
 
-    Raises `NoAdmissibleStart` if all do, `OptimisationFailed` if no energy is finite.
+    Raises `NoAdmissibleStart` if there is none, `OptimisationFailed` if no energy is finite.
     """
     motion, scene = problem.motion.motion_id, problem.scene.scene_id
     finite = [fit for fit in fits if math.isfinite(fit.energy)]
     if not finite:
         raise OptimisationFailed(motion, scene, "no start reached a finite energy")
-    limit = problem.settings.max_depth
-    depths = [deepest_vertex(problem, fit) for fit in finite]
-    clear = [
-        fit for fit, depth in zip(finite, depths, strict=True) if limit is None or depth <= limit
-    ]
-    if not clear:
-        reason = f"every start leaves the body {min(depths):.2f} m or more inside something"
-        raise NoAdmissibleStart(motion, scene, reason)
-    return min(clear, key=lambda fit: fit.energy)
+    faults = [fault(problem, fit) for fit in finite]
+    sound = [fit for fit, found in zip(finite, faults, strict=True) if not found]
+    if not sound:
+        raise NoAdmissibleStart(motion, scene, f"at its best start the body {faults[0]}")
+    return min(sound, key=lambda fit: fit.energy)
+
+
+def fault(problem: Problem, fit: Fit) -> str:
+    """What is wrong with a fit by the settings' own limits, in words; empty if nothing."""
+    settings = problem.settings
+    if settings.max_depth is not None:
+        depth = deepest_vertex(problem, fit)
+        if depth > settings.max_depth:
+            return f"is {depth:.2f} m deep inside something"
+    if settings.start_filter is not None:
+        rigid = Starts(np.array([fit.yaw]), fit.translation[None], np.zeros(1))
+        match = float(class_match(problem, rigid)[0])
+        if match < settings.start_filter:
+            expected = ", ".join(["floor", *problem.expected_classes()])
+            return f"touches what it expects ({expected}) with {match:.0%} of its contacts only"
+    return ""
 
 
 def deepest_vertex(problem: Problem, fit: Fit) -> float:

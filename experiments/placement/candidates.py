@@ -1,13 +1,15 @@
 """Start search: where in the room, and facing where, a motion may begin to be optimised.
 
-All starts of a grid are scored coarsely (some frames, some vertices, nearest-node distances), the
-best few exactly, and of neighbours only the best survives.
+All starts of a grid are scored coarsely (some frames, some vertices), the best few exactly, and of
+neighbours only the best survives.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -15,11 +17,11 @@ from jaxtyping import Bool, Float, Integer
 from torch import Tensor
 
 from experiments.placement.errors import MotionTooLong, NoAdmissibleStart
-from experiments.placement.objectives import placement_terms, total
-from experiments.placement.problem import Problem
+from experiments.placement.objectives import total
+from experiments.placement.problem import Problem, RigidProblem
 
 _LEAST_KEPT = 60
-_BATCH_POINTS = 3_000_000
+_BATCH_POINTS = 500_000
 
 
 @dataclass(frozen=True)
@@ -126,146 +128,80 @@ def suppress(starts: Starts, distance: float, angle_deg: float) -> Starts:
     return starts.take(np.array(chosen, dtype=np.int64))
 
 
-def exact_scores(problem: Problem, starts: Starts) -> Float[np.ndarray, " N"]:
-    """E_p of the unaltered motion at every start: all frames, all vertices, trilinear distances."""
-    n_frames, n_vertices = problem.contact.shape
-    batch = max(1, _BATCH_POINTS // (n_frames * n_vertices))
-    scores = []
+def exact_scores(problem: RigidProblem, starts: Starts) -> Float[np.ndarray, " N"]:
+    """E_p of the unaltered motion at every start: all frames and all vertices."""
+    return _batched(problem, starts, lambda bodies: total(problem.terms(bodies)))
+
+
+def coarse_scores(problem: RigidProblem, starts: Starts) -> Float[np.ndarray, " N"]:
+    """Cheap stand-in for `exact_scores`, good enough to drop the hopeless starts.
+
+    Reads `coarse_frames` frames, all vertices that are ever in contact and `coarse_vertices`
+    others, which stand for all the rest.
+    """
+    frames = _spread(len(problem.k), problem.settings.coarse_frames)
+    ever = problem.contact.any(0).numpy()
+    others = np.flatnonzero(~ever)
+    chosen = others[_spread(len(others), problem.settings.coarse_vertices)]
+    thin = problem.thinned(frames, np.concatenate([np.flatnonzero(ever), chosen]))
+    share = len(others) / max(len(chosen), 1)
+
+    def score(bodies: Float[Tensor, "B T V 3"]) -> Float[Tensor, " B"]:
+        terms = thin.terms(bodies)
+        # Only the penalty is summed over the vertices that were thinned out.
+        return total({**terms, "penetration": terms["penetration"] * share})
+
+    return _batched(thin, starts, score)
+
+
+def class_match(problem: RigidProblem, starts: Starts) -> Float[np.ndarray, " N"]:
+    """Share of the contact vertices that stand nearest to the class they expect.
+
+    Floor and everything else are counted apart and the lower share is the answer, because soles
+    outnumber a seat; one where the motion expects nothing. Uses `coarse_frames` frames.
+    """
+    beyond = problem.beyond_floor()
+    match = np.ones(len(starts))
+    for group in (beyond, problem.contact & ~beyond):
+        frames = np.flatnonzero(group.any(1))
+        if len(frames) == 0:
+            continue
+        frames = frames[_spread(len(frames), problem.settings.coarse_frames)]
+        columns = np.flatnonzero(group[frames].any(0))
+        thin, asked = problem.thinned(frames, columns), group[frames][:, columns]
+        found = _batched(thin, starts, partial(_share_right, thin, asked))
+        match = np.minimum(match, found)
+    return match
+
+
+def _share_right(
+    problem: RigidProblem, asked: Bool[Tensor, "T V"], bodies: Float[Tensor, "B T V 3"]
+) -> Float[Tensor, " B"]:
+    right = problem.field.label(bodies, asked) == problem.wanted
+    return right[:, asked].to(bodies.dtype).mean(-1)
+
+
+def _batched(
+    problem: RigidProblem,
+    starts: Starts,
+    score: Callable[[Float[Tensor, "B T V 3"]], Float[Tensor, " B"]],
+) -> Float[np.ndarray, " N"]:
+    """Score the unaltered motion at every start, as many at a time as fit in memory."""
+    batch = max(1, _BATCH_POINTS // problem.contact.numel())
+    scores = np.zeros(len(starts))
     for begin in range(0, len(starts), batch):
         part = slice(begin, begin + batch)
         yaw = torch.as_tensor(starts.yaw[part], dtype=problem.k.dtype)
         translation = torch.as_tensor(starts.translation[part], dtype=problem.k.dtype)
         with torch.no_grad():
-            scores.append(total(problem.terms(problem.moved(yaw, translation))))
-    return torch.cat(scores).double().numpy()
-
-
-def coarse_scores(problem: Problem, starts: Starts) -> Float[np.ndarray, " N"]:
-    """Cheap stand-in for `exact_scores`, good enough to drop the hopeless starts.
-
-    Reads nearest nodes at `coarse_frames` frames, all vertices that are ever in contact and
-    `coarse_vertices` others, which count for all the rest.
-    """
-    sample = _coarse_sample(problem)
-    grids = _NodeGrids(problem)
-    scores = np.zeros(len(starts))
-    for yaw in np.unique(starts.yaw):
-        index = np.flatnonzero(starts.yaw == yaw)
-        turned = _turned(problem, sample.vertices, float(yaw))
-        for part in np.array_split(index, max(1, len(index) // 256)):
-            distance, label = grids.read(turned, starts.translation[part], sample.contact)
-            terms = placement_terms(
-                distance, label, sample.contact, sample.wanted, sample.k, problem.settings
-            )
-            # Others stand for more vertices than themselves; only the penalty is theirs.
-            terms["penetration"] = terms["penetration"] * sample.share
-            scores[part] = total(terms).double().numpy()
+            scores[part] = score(problem.moved(yaw, translation)).double().numpy()
     return scores
 
 
-def class_match(problem: Problem, starts: Starts) -> Float[np.ndarray, " N"]:
-    """Share of the contact vertices expecting more than floor that stand nearest to their class.
-
-    One where the motion expects nothing but floor.
-    """
-    beyond = problem.beyond_floor()
-    if not beyond.any():
-        return np.ones(len(starts))
-    picks = beyond.nonzero()
-    picks = picks[torch.linspace(0, len(picks) - 1, min(len(picks), 400)).long()]
-    points = problem.vertices[picks[:, 0], picks[:, 1]]
-    wanted = problem.wanted[picks[:, 0], picks[:, 1]]
-    grids, match = _NodeGrids(problem), np.zeros(len(starts))
-    for yaw in np.unique(starts.yaw):
-        index = np.flatnonzero(starts.yaw == yaw)
-        turned = _turned(problem, points[None], float(yaw))
-        label = grids.labels(turned, starts.translation[index])[:, 0]
-        match[index] = (label == wanted).double().mean(-1).numpy()
-    return match
-
-
-@dataclass(frozen=True)
-class _Sample:
-    """The frames and vertices of the coarse scoring."""
-
-    vertices: Float[Tensor, "F W 3"]
-    contact: Bool[Tensor, "F W"]
-    wanted: Integer[Tensor, "F W"]
-    k: Float[Tensor, " F"]
-    share: float
-    """How many vertices each of the others stands for."""
-
-
-def _coarse_sample(problem: Problem) -> _Sample:
-    n_frames = len(problem.contact)
-    frames = np.unique(np.linspace(0, n_frames - 1, problem.settings.coarse_frames).round())
-    ever = problem.contact.any(0).numpy()
-    others = np.flatnonzero(~ever)
-    count = min(len(others), problem.settings.coarse_vertices)
-    spread = others[np.linspace(0, len(others) - 1, count).round().astype(int)]
-    frame = torch.as_tensor(frames.astype(np.int64))
-    column = torch.as_tensor(np.concatenate([np.flatnonzero(ever), spread]))
-    return _Sample(
-        vertices=problem.vertices[frame][:, column],
-        contact=problem.contact[frame][:, column],
-        wanted=problem.wanted[frame][:, column],
-        k=problem.k[frame] * (n_frames / len(frames)),
-        share=len(others) / max(count, 1),
-    )
-
-
-class _NodeGrids:
-    """Nearest-node reading of the baked volumes for many translations of the same points."""
-
-    def __init__(self, problem: Problem) -> None:
-        volumes = problem.scene.volumes
-        self._origin = torch.tensor(volumes.origin, dtype=problem.k.dtype)
-        self._cell = volumes.cell
-        self._shape = volumes.sdf.shape
-        # One flat table of both fields: points in contact read the second half.
-        both = np.stack([volumes.thickened, volumes.sdf])
-        self._distance = torch.as_tensor(both, dtype=problem.k.dtype).reshape(-1)
-        self._label = torch.as_tensor(volumes.label).reshape(-1)
-
-    def read(
-        self,
-        points: Float[Tensor, "F W 3"],
-        translation: Float[np.ndarray, "N 3"],
-        contact: Bool[Tensor, "F W"],
-    ) -> tuple[Float[Tensor, "N F W"], Integer[Tensor, "N F W"]]:
-        """Distance, and class where it matters: at vertices in contact (0 elsewhere)."""
-        node = self._nodes(points, translation)
-        distance = self._distance[node + contact * len(self._label)]
-        label = torch.zeros_like(node)
-        label[:, contact] = self._label[node[:, contact]].long()
-        return distance, label
-
-    def labels(
-        self, points: Float[Tensor, "F W 3"], translation: Float[np.ndarray, "N 3"]
-    ) -> Integer[Tensor, "N F W"]:
-        """Class of the nearest surface."""
-        return self._label[self._nodes(points, translation)].long()
-
-    def _nodes(
-        self, points: Float[Tensor, "F W 3"], translation: Float[np.ndarray, "N 3"]
-    ) -> Integer[Tensor, "N F W"]:
-        offset = torch.as_tensor(translation, dtype=points.dtype)
-        base = (points - self._origin) / self._cell
-        flat = torch.zeros((len(offset), *points.shape[:2]), dtype=torch.int64)
-        for axis, size in enumerate(self._shape):
-            step = offset[:, axis, None, None] / self._cell
-            node = (base[..., axis] + step).round_().clamp_(0, size - 1)
-            flat.mul_(size).add_(node.long())
-        return flat
-
-
-def _turned(problem: Problem, points: Float[Tensor, "F W 3"], yaw: float) -> Float[Tensor, "F W 3"]:
-    """Points of the clip turned about its centre, not yet translated."""
-    cosine, sine = np.cos(yaw), np.sin(yaw)
-    offset = points[..., :2] - problem.centre
-    x = cosine * offset[..., 0] - sine * offset[..., 1]
-    y = sine * offset[..., 0] + cosine * offset[..., 1]
-    return torch.stack([x + problem.centre[0], y + problem.centre[1], points[..., 2]], dim=-1)
+def _spread(length: int, count: int) -> Integer[np.ndarray, " M"]:
+    """Up to `count` indices spread evenly over a range."""
+    spread = np.linspace(0, length - 1, min(count, length)).round()
+    return spread.astype(np.int64)
 
 
 def _stays_inside(problem: Problem, yaw: float, translation: Float[np.ndarray, "3"]) -> bool:

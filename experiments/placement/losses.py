@@ -58,13 +58,13 @@ def semantic_loss(
     scene_label: Integer[Tensor, "*B T V"],
     wanted: Integer[Tensor, "T V"],
     contact: Bool[Tensor, "T V"],
-) -> Float[Tensor, "*B T"]:
+) -> Integer[Tensor, "*B T"]:
     """Semantic part of L_afford: number of contact vertices whose nearest scene class is another.
 
     POSA's cross-entropy of a one-hot label against the predicted class is a constant plus one per
     mismatch; vertices without contact have the label void on both sides. It has no gradient.
     """
-    return ((scene_label != wanted) & contact).sum(-1).to(torch.get_default_dtype())
+    return ((scene_label != wanted) & contact).sum(-1)
 
 
 def pose_loss(delta: Float[Tensor, "T J 3"]) -> Float[Tensor, " T"]:

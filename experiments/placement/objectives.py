@@ -33,8 +33,8 @@ def placement_terms(
     }
     if scene_label is not None:
         misses = losses.semantic_loss(scene_label, wanted, contact)
-        per_frame["semantics"] = settings.semantic_weight * misses
-    return {name: value @ k.to(value.dtype) for name, value in per_frame.items()}
+        per_frame["semantics"] = settings.semantic_weight * misses.to(k.dtype)
+    return {name: value @ k for name, value in per_frame.items()}
 
 
 def alteration_terms(

@@ -25,45 +25,25 @@ REFERENCE_STEP_S = 1.0 / 30.0
 
 
 @dataclass(frozen=True)
-class Problem:
-    """All that does not change while a motion is placed in a scene. Clip frame unless said.
+class RigidProblem:
+    """What E_p of an unaltered motion needs. Axes: T frames, V vertices; clip frame, metres."""
 
-    Axes: T frames, V vertices of the features' mesh.
-    """
-
-    motion: Motion
-    scene: Scene
-    body: BodyModel
     settings: PlacementSettings
-    features: InteractionFeatures
-    weights: FrameWeights
     field: SceneField
-    pose: Float[Tensor, "T 22 3"]
-    transl: Float[Tensor, "T 3"]
     vertices: Float[Tensor, "T V 3"]
-    """Unaltered body, metres."""
-    pelvis: Float[np.ndarray, "T 3"]
     contact: Bool[Tensor, "T V"]
     """Predicted contact above the threshold; fixed during optimisation."""
     wanted: Int64[Tensor, "T V"]
     """Predicted class, 0 (void) where there is no contact."""
     k: Float[Tensor, " T"]
-    step_scale: Float[Tensor, " T"]
     centre: Float[Tensor, "2"]
-    floor: float
-    """Height of the clip's own floor, metres."""
-
-    @property
-    def vertex_ids(self) -> Integer[np.ndarray, " V"]:
-        """The vertices of the energy, in the body's full numbering."""
-        return self.features.vertex_ids
 
     def terms(
         self, vertices: Float[Tensor, "*B T V 3"], huber: float = 0.0, semantics: bool = True
     ) -> dict[str, Float[Tensor, "*B"]]:
         """E_p by terms for bodies in the scene's frame, for any number of starts at once."""
         distance = self.field.distance(vertices, self.contact)
-        label = self.field.label(vertices.detach()) if semantics else None
+        label = self.field.label(vertices.detach(), self.contact) if semantics else None
         return placement_terms(
             distance, label, self.contact, self.wanted, self.k, self.settings, huber
         )
@@ -74,6 +54,48 @@ class Problem:
         """The unaltered body moved rigidly into the scene's frame."""
         return move(self.vertices, yaw, translation, self.centre)
 
+    def beyond_floor(self) -> Bool[Tensor, "T V"]:
+        """Contact vertices that expect something other than the floor."""
+        return self.contact & (self.wanted != _FLOOR)
+
+    def thinned(
+        self, frames: Integer[np.ndarray, " F"], columns: Integer[np.ndarray, " W"]
+    ) -> RigidProblem:
+        """Some frames and vertices only, for scoring: the frames left stand for all."""
+        frame, column = torch.as_tensor(frames), torch.as_tensor(columns)
+        return RigidProblem(
+            settings=self.settings,
+            field=self.field,
+            vertices=self.vertices[frame][:, column],
+            contact=self.contact[frame][:, column],
+            wanted=self.wanted[frame][:, column],
+            k=self.k[frame] * (len(self.k) / len(frames)),
+            centre=self.centre,
+        )
+
+
+@dataclass(frozen=True)
+class Problem(RigidProblem):
+    """The whole of it: the motion, its body and scene, and what E_alt needs besides."""
+
+    motion: Motion
+    scene: Scene
+    body: BodyModel
+    features: InteractionFeatures
+    weights: FrameWeights
+    pose: Float[Tensor, "T 22 3"]
+    transl: Float[Tensor, "T 3"]
+    pelvis: Float[np.ndarray, "T 3"]
+    step_scale: Float[Tensor, " T"]
+    """What frame-to-frame differences are multiplied by; see `time_step_scale`."""
+    floor: float
+    """Height of the clip's own floor, metres."""
+
+    @property
+    def vertex_ids(self) -> Integer[np.ndarray, " V"]:
+        """The vertices of the energy, in the body's full numbering."""
+        return self.features.vertex_ids
+
     def weighted(self, weights: FrameWeights) -> Problem:
         """The same with other frame weights."""
         k = torch.as_tensor(weights.values, dtype=self.k.dtype)
@@ -83,10 +105,6 @@ class Problem:
         """Names of the classes that the motion expects to touch, floor left out."""
         present = torch.unique(self.wanted[self.beyond_floor()]).tolist()
         return [MPCAT40[index] for index in present]
-
-    def beyond_floor(self) -> Bool[Tensor, "T V"]:
-        """Contact vertices that expect something other than the floor."""
-        return self.contact & (self.wanted != _FLOOR)
 
 
 def build_problem(

@@ -34,6 +34,11 @@ class SceneField:
         column = torch.cumsum(ever, 0).sub(1).clamp(min=0)
         return torch.where(contact, plain[..., column], distance)
 
-    def label(self, points: Float[Tensor, "*B T V 3"]) -> Int64[Tensor, "*B T V"]:
-        """Class of the nearest surface (mpcat40 index)."""
-        return self._plain.label(points)
+    def label(
+        self, points: Float[Tensor, "*B T V 3"], contact: Bool[Tensor, "T V"]
+    ) -> Int64[Tensor, "*B T V"]:
+        """Class of the nearest surface (mpcat40 index) where a vertex is ever in contact, else 0."""
+        ever = contact.any(0)
+        label = torch.zeros(points.shape[:-1], dtype=torch.int64)
+        label[..., ever] = self._plain.label(points[..., ever, :])
+        return label

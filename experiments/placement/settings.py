@@ -43,7 +43,7 @@ class PlacementSettings:
     than floor stand nearest to their class (ours); None keeps all."""
     wall_clearance: float = 0.15
     """The pelvis path stays this far inside the room, metres (ours)."""
-    max_depth: float | None = 0.30
+    max_depth: float | None = 0.20
     """Reject a fit where a vertex without contact is deeper than this inside something,
     metres (ours); None keeps all."""
     coarse_frames: int = 20
