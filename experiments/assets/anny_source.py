@@ -16,6 +16,7 @@ from jaxtyping import Float, Integer
 from scipy.spatial.transform import Rotation
 
 from experiments.body.model import JOINT_NAMES, PARENTS
+from renderer.files import InputError
 
 REST_FROM_ANNY = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
@@ -101,8 +102,10 @@ def anny_model(topology: str) -> Any:
     `ANNY_CACHE_DIR` says where; never ask for the topologies smpl and smplx, which anny downloads
     under a non-commercial licence.
     """
-    import anny
-
+    try:
+        import anny
+    except ModuleNotFoundError:
+        raise InputError("anny", "package", None, "pip install '.[assets]'") from None
     return anny.Anny(topology=topology, skinning_method="lbs").double()
 
 

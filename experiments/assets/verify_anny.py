@@ -7,7 +7,6 @@ differs from the stored one. `--update` stores the figures anew.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
@@ -51,7 +50,7 @@ def main(update: bool) -> None:
             write_json(CHECK_FILE, report)
         else:
             _check_figures(report, read_json(CHECK_FILE))
-    except (InputError, ModuleNotFoundError) as error:
+    except InputError as error:
         raise click.ClickException(str(error)) from None
     for name, figures in report["figures"].items():
         click.echo(f"{name}: " + ", ".join(f"{key} {value:.3g}" for key, value in figures.items()))

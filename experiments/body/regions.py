@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from experiments.body.model import JOINT_NAMES
+from experiments.body.surface import vertex_normals
 
 _UP, _FRONT = 1, 2
 _SOLE_HEIGHT_M = 0.025
@@ -86,16 +87,3 @@ def farthest_points(
         step = np.linalg.norm(points - points[picks[index]], axis=1)
         distance = np.minimum(distance, step)
     return picks
-
-
-def vertex_normals(
-    vertices: Float[np.ndarray, "V 3"], faces: Integer[np.ndarray, "F 3"]
-) -> Float[np.ndarray, "V 3"]:
-    """Unit vertex normals, area weighted; zero for vertices without a face."""
-    corners = vertices[faces]
-    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.zeros_like(vertices)
-    for corner in range(3):
-        np.add.at(normals, faces[:, corner], areas)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(normals / np.maximum(length, 1e-12))
