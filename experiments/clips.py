@@ -19,9 +19,9 @@ from experiments.records import SetFolder
 from experiments.scene.baking import load_room
 from experiments.scene.stage_parts import stage_parts
 from renderer.cameras import CameraRig, choose_cameras
-from renderer.files import InputError, read_json, write_json
+from renderer.files import read_json, write_json
 from renderer.render import RenderedClip, render_clip
-from renderer.settings import PRESETS, RenderSettings
+from renderer.settings import RenderSettings, preset
 from renderer.stage import Stage
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def render_job(job: RenderJob) -> None:
 def render_settings(job: RenderJob) -> RenderSettings:
     """The preset of the configuration with its tiling and frame rate."""
     chosen = job.config.render
-    return dataclasses.replace(PRESETS[chosen.preset], tiling=chosen.tiling, fps=float(chosen.fps))
+    return preset(chosen.preset, tiling=chosen.tiling, fps=float(chosen.fps))
 
 
 def main_takes(job: RenderJob, body: BodyModel) -> list[Take]:
@@ -106,11 +106,9 @@ def skinned(body: BodyModel, motion: Motion) -> Float[np.ndarray, "T V 3"]:
     return np.ascontiguousarray(vertices.numpy())
 
 
-def render_placement(placement: Path, out: Path, preset: str, tiling: str) -> dict[str, Any]:
+def render_placement(placement: Path, out: Path, preset_name: str, tiling: str) -> dict[str, Any]:
     """Render one placement by itself; returns the clip's record."""
-    if preset not in PRESETS:
-        raise InputError("render", "preset", preset, "one of " + ", ".join(PRESETS))
-    settings = dataclasses.replace(PRESETS[preset], tiling=tiling)
+    settings = preset(preset_name, tiling=tiling)
     placed = read_placement(placement)
     body, scene, parts = (
         load_body(placed.motion.body),
@@ -175,7 +173,9 @@ def _clip_record(
         "method": take.method,
         "scene": job.scene,
         "motion": job.motion_id,
-        "views": [view.name for view in rig.views],
+        "views": [
+            view.name for view in (rig.views if settings.tiling != "single" else [rig.best()])
+        ],
         "tiling": settings.tiling,
         "scores": take.scores,
         "placement": take.placement,

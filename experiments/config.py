@@ -130,10 +130,12 @@ def _value(source: Path, where: str, kind: str, value: Any) -> Any:
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise InputError(source, where, value, "a list of names")
         return tuple(value)
-    wanted: dict[str, tuple[type, ...]] = {"int": (int,), "float": (int, float), "str": (str,)}
-    if not isinstance(value, wanted[kind]) or isinstance(value, bool):
+    if kind == "float" and isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    wanted = {"int": int, "str": str}.get(kind, float)
+    if not isinstance(value, wanted) or isinstance(value, bool):
         raise InputError(source, where, value, f"a value of type {kind}")
-    return float(value) if kind == "float" else value
+    return value
 
 
 def _validate(source: Path, config: StimulusSetConfig) -> None:

@@ -27,6 +27,10 @@ class InputError(ValueError):
         super().__init__(f"{source}: {field}: got {shown}, wanted {wanted}".replace("\n", " "))
         self.source, self.field, self.value, self.wanted = str(source), field, value, wanted
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
+        # Exceptions cross process borders by their arguments, and ours are not the text.
+        return InputError, (self.source, self.field, str(self.value), self.wanted)
+
 
 @contextmanager
 def atomic_path(target: Path) -> Iterator[Path]:
