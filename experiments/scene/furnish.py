@@ -14,7 +14,6 @@ from experiments.scene.pack import Pack, Piece, default_pack
 from experiments.scene.parametric import make_shape
 from experiments.scene.scene import MPCAT40
 from experiments.scene.settle import settled_height
-from experiments.scene.tops import refine_tops
 from renderer.files import InputError
 
 SOFT_ASSETS = frozenset({"shape:cushion", "shape:blanket", "pack:teddy_bear_51"})
@@ -82,11 +81,14 @@ class _Body:
 
 
 def _own_frame(item: Item, pack: Pack, source: object) -> tuple[_Body, ...]:
-    """Piece or shape, scaled, with normals, large tops refined, tinted."""
+    """Piece or shape, scaled, with normals, tinted."""
     if item.piece is not None:
         piece = pack.piece(item.piece)
         scale = _scale(item, piece, source)
-        bodies = tuple(_Body(p.corners * scale, p.corners, p.colour, p.uv, p.texture, None) for p in piece.parts)  # fmt: skip
+        bodies = tuple(
+            _Body(p.corners * scale, p.corners, p.colour, p.uv, p.texture, None)
+            for p in piece.parts
+        )
     else:
         shapes = make_shape(str(item.shape), item.params, f"{source}: {item.id}")
         bodies = tuple(
@@ -94,11 +96,6 @@ def _own_frame(item: Item, pack: Pack, source: object) -> tuple[_Body, ...]:
             for p in shapes
         )
     bodies = _with_normals(bodies)
-    refined = refine_tops(tuple((b.corners, b.normals, b.uv, b.vertex_colours) for b in bodies))
-    bodies = tuple(
-        replace(body, corners=corners, normals=normals, uv=uv, vertex_colours=colours)
-        for body, (corners, normals, uv, colours) in zip(bodies, refined, strict=True)
-    )
     return bodies if item.tint is None else _tinted(bodies, item.tint)
 
 
@@ -146,10 +143,7 @@ def _tinted(bodies: tuple[_Body, ...], tint: Colour) -> tuple[_Body, ...]:
 
     A textured material keeps its pattern: its brightness is kept relative to its mean.
     """
-    area = [
-        np.linalg.norm(np.cross(b.corners[:, 1] - b.corners[:, 0], b.corners[:, 2] - b.corners[:, 0]), axis=1).sum()
-        for b in bodies
-    ]  # fmt: skip
+    area = [triangle_areas(body.corners).sum() for body in bodies]
     main = bodies[int(np.argmax(area))]
     return tuple(_recoloured(body, tint) if _alike(body, main) else body for body in bodies)
 
@@ -164,6 +158,12 @@ def _recoloured(body: _Body, tint: Colour) -> _Body:
     grey = body.texture.astype(float).mean(-1, keepdims=True)
     coloured = np.clip(grey / grey.mean() * np.array(tint), 0.02, 0.86)
     return replace(body, texture=np.round(255 * coloured).astype(np.uint8))
+
+
+def triangle_areas(corners: Float[np.ndarray, "F 3 3"]) -> Float[np.ndarray, " F"]:
+    """Areas in square metres."""
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(np.linalg.norm(cross, axis=1) / 2)
 
 
 def _yaw_matrix(degrees: float) -> Float[np.ndarray, "3 3"]:

@@ -38,7 +38,7 @@ def carton(
     *, size: Size3 = (0.42, 0.36, 0.32), colour: Colour = (0.66, 0.54, 0.40)
 ) -> tuple[ShapePart, ...]:
     """A closed cardboard box with a strip of tape along its flaps."""
-    width, depth, height = size
+    width, _, height = size
     lighter = tuple(min(0.84, 1.15 * c) for c in colour)
     tape = [
         box((width * 1.001, 0.05, 0.0015), (0, 0, height)),
@@ -126,8 +126,8 @@ def laptop(*, angle: float = 108.0) -> tuple[ShapePart, ...]:
     keys = box((0.28, 0.10, 0.001), (0, 0.035, 0.016))
     pad = box((0.10, 0.065, 0.001), (0, -0.065, 0.016))
     hinge = (0.0, 0.11, 0.014)
-    lid = turned(box((0.33, 0.22, 0.007), (0, 0, 0.016), bevel=0.002), "x", 180 - angle, hinge)
-    glass = turned(box((0.31, 0.195, 0.0015), (0, 0.002, 0.0148)), "x", 180 - angle, hinge)
+    lid = turned(box((0.33, 0.22, 0.007), (0, 0, 0.016), bevel=0.002), "x", -angle, hinge)
+    glass = turned(box((0.31, 0.195, 0.0015), (0, 0.002, 0.0148)), "x", -angle, hinge)
     return part((0.56, 0.57, 0.58), body, lid), part(SCREEN, keys, glass), part(METAL, pad)
 
 
@@ -211,9 +211,8 @@ def pouf(
     profile = np.sqrt(np.maximum(1 - np.abs(2 * z - 1) ** 3.2, 0)) ** 0.8
     bulge = 1 - 0.025 * (1 - np.abs(np.sin(ribs * angles / 2)))
     radius = 0.5 * profile[None] * bulge[:, None]
-    grid = np.stack(
-        [radius * np.cos(angles)[:, None], radius * np.sin(angles)[:, None], np.broadcast_to(z, radius.shape)], -1
-    )  # fmt: skip
+    x, y = radius * np.cos(angles)[:, None], radius * np.sin(angles)[:, None]
+    grid = np.stack([x, y, np.broadcast_to(z, radius.shape)], -1)
     return (part(colour, surface(grid) * np.array(size)),)
 
 
@@ -258,6 +257,25 @@ def vase(*, height: float = 0.24, colour: Colour = (0.58, 0.62, 0.60)) -> tuple[
     r = [0.20, 0.28, 0.33, 0.30, 0.20, 0.13, 0.12, 0.16, 0.13, 0.10, 0.10]
     z = [0.0, 0.12, 0.35, 0.55, 0.74, 0.86, 0.94, 1.0, 0.99, 0.94, 0.80]
     return (part(colour, height * lathe(list(zip(r, z, strict=True)), 24)),)
+
+
+def glass(
+    *, height: float = 0.11, colour: Colour = (0.66, 0.72, 0.72)
+) -> tuple[ShapePart, ...]:
+    """A drinking glass or beaker."""
+    profile = [(0.27, 0.0), (0.34, 1.0), (0.31, 1.0), (0.25, 0.08)]
+    return (part(colour, height * lathe(profile, 20)),)
+
+
+def pen_cup(*, seed: int = 0) -> tuple[ShapePart, ...]:
+    """A beaker with a few pens."""
+    rng = np.random.default_rng(seed)
+    beaker = lathe([(0.038, 0.0), (0.038, 0.10), (0.034, 0.10), (0.034, 0.01)], 20)
+    pens = [
+        tube((0, 0, 0.012), (*(0.045 * rng.uniform(-1, 1, 2)), rng.uniform(0.13, 0.16)), 0.004, 6)
+        for _ in range(5)
+    ]
+    return part((0.40, 0.42, 0.42), beaker), part((0.28, 0.33, 0.42), *pens)
 
 
 def bowl(*, radius: float = 0.13, colour: Colour = (0.70, 0.67, 0.60)) -> tuple[ShapePart, ...]:

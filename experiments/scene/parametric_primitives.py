@@ -36,7 +36,7 @@ def part(colour: Colour, *solids: Triangles) -> ShapePart:
 def box(size: Vector, at: Vector = (0, 0, 0), bevel: float = 0.0) -> Triangles:
     """A box; a bevel rounds its twelve edges by one slanted face each."""
     half = np.asarray(size, float) / 2
-    middle = np.asarray(at, float) + [0, 0, half[2]]
+    middle = np.add(at, (0.0, 0.0, half[2]))
     if bevel <= 0:
         return middle + half * _UNIT_BOX
     bevel = min(bevel, 0.45 * 2 * float(half.min()))
@@ -49,11 +49,9 @@ def lathe(profile: Sequence[tuple[float, float]], segments: int = 24) -> Triangl
     angles = np.linspace(0, 2 * np.pi, segments + 1)
     ring = np.stack([np.cos(angles), np.sin(angles)], 1)
     radius, height = np.array(points).T
-    grid = np.concatenate(
-        [radius[:, None, None] * ring[None], np.broadcast_to(height[:, None, None], (len(points), segments + 1, 1))],
-        axis=2,
-    )  # fmt: skip
-    return surface(grid)
+    spread = np.broadcast_to(height[:, None, None], (len(points), segments + 1, 1))
+    grid = np.concatenate([radius[:, None, None] * ring[None], spread], axis=2)
+    return surface(grid.transpose(1, 0, 2))
 
 
 def cylinder(
@@ -98,8 +96,8 @@ def superellipsoid(
     y = _power(np.cos(v), flat) * _power(np.sin(u), square)
     z = _power(np.sin(v), flat)
     half = np.asarray(size, float) / 2
-    grid = np.stack([x, y, z], -1) * half + np.asarray(at, float) + [0, 0, half[2]]
-    return surface(grid)
+    grid = np.stack([x, y, z], -1) * half + np.add(at, (0.0, 0.0, half[2]))
+    return surface(grid.transpose(1, 0, 2))
 
 
 def pillow(size: Vector, at: Vector = (0, 0, 0), n: int = 12) -> Triangles:
