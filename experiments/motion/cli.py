@@ -97,9 +97,9 @@ def import_motion(file: Path, out: Path, body: str, fps: float | None, as_json: 
 
 
 def _table(rows: list[dict[str, Any]]) -> str:
-    heads = ("id", "seconds", "floor_error_cm", "foot_skate_cm_s", "sole_penetration_mm")
-    heads += ("lowest_other_cm", "joint_step_deg", "root_acceleration", "source")
-    cells = [list(heads), *[[str(row[head]) for head in heads] for row in rows]]
+    heads = ["id", "seconds", "floor_error_cm", "foot_skate_cm_s", "sole_penetration_mm"]
+    heads += ["lowest_other_cm", "joint_step_deg", "root_acceleration", "source"]
+    cells = [heads, *[[str(row[head]) for head in heads] for row in rows]]
     widths = [max(len(line[column]) for line in cells) for column in range(len(heads))]
     lines = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)) for line in cells]
     return "\n".join(line.rstrip() for line in lines)

@@ -1,4 +1,4 @@
-"""Composition: clips moved in the plane, joined at the best seam, cross-faded with least jerk."""
+"""Composition: clips moved in the plane and joined at the best seam with least jerk."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from experiments.motion.capture import INDEX
-from experiments.motion.figure import Figure
+from experiments.motion.figure import SIDES, Figure
 from experiments.motion.foot_lock import minimum_jerk
 from experiments.motion.motion import Motion
 from experiments.motion.resample import window
@@ -21,47 +21,75 @@ from experiments.motion.rotations import (
     world_rotations,
 )
 
-_SEAM_JOINTS = tuple(
-    INDEX[f"{side}_{part}"]
-    for side in ("left", "right")
-    for part in ("knee", "ankle", "foot", "wrist")
-) + (INDEX["head"],)
+_SEAM_PARTS = ("knee", "ankle", "foot", "wrist")
+_SEAM_JOINTS = (INDEX["head"], *(INDEX[f"{s}_{part}"] for s in SIDES for part in _SEAM_PARTS))
 _POSITION_WEIGHT, _VELOCITY_WEIGHT = 2.0, 0.3
 
 
-def join(
-    first: Motion, second: Motion, figure: Figure, search: int = 12, blend: int = 10
-) -> Motion:
-    """`second` after `first`, overlapping by `blend` frames at the most similar place.
+def join(first: Motion, second: Motion, figure: Figure, search: int = 6, blend: int = 8) -> Motion:
+    """`second` after `first`, cut together where the body differs least.
 
-    The end of `first` (its last `search` + `blend` frames) and the start of `second` are compared;
-    `second` is turned and shifted in the plane to continue where `first` is.
+    One of the last `search` frames of `first` is identified with one of the first `search` frames of
+    `second`, which is turned and shifted in the plane to continue there. What differs at that seam is
+    shared by both sides and faded out with least jerk over `blend` frames each way, so neither timing
+    nor phase changes.
     """
-    end, start = best_seam(first, second, figure, search, blend)
-    lead, tail = window(first, 0, end + blend), window(second, start, second.n_frames)
-    tail = continue_from(tail, lead, end)
-    share = minimum_jerk((np.arange(blend) + 1) / (blend + 1))
-    pose = slerp(lead.pose[end:], tail.pose[:blend], np.repeat(share[:, None], 22, axis=1))
-    transl = lead.transl[end:] * (1 - share[:, None]) + tail.transl[:blend] * share[:, None]
-    pose = np.concatenate([lead.pose[:end], pose, tail.pose[blend:]])
-    transl = np.concatenate([lead.transl[:end], transl, tail.transl[blend:]])
-    times = np.arange(len(pose)) / first.fps
-    return dataclasses.replace(first, pose=pose, transl=transl, times=times)
+    end, start = best_seam(first, second, figure, search)
+    lead = window(first, 0, end + 1)
+    tail = continue_from(window(second, start, second.n_frames), lead, end)
+    half = np.full(22, 0.5)
+    pose = slerp(lead.pose[-1], tail.pose[0], half)
+    transl = (lead.transl[-1] + tail.transl[0]) / 2
+    before = _bent_to(lead, -1, pose, transl, minimum_jerk(1 - np.arange(end, -1, -1) / blend))
+    after = _bent_to(tail, 0, pose, transl, minimum_jerk(1 - np.arange(tail.n_frames) / blend))
+    transl = np.concatenate([before.transl[:-1], after.transl])
+    return dataclasses.replace(
+        first,
+        pose=np.concatenate([before.pose[:-1], after.pose]),
+        transl=_even_speed(transl, end, blend),
+        times=np.arange(len(transl)) / first.fps,
+    )
 
 
-def best_seam(
-    first: Motion, second: Motion, figure: Figure, search: int, blend: int
-) -> tuple[int, int]:
+def _even_speed(
+    transl: Float[np.ndarray, "T 3"], seam: int, blend: int
+) -> Float[np.ndarray, "T 3"]:
+    """The path with its jump of velocity at a frame spread over `blend` frames each way."""
+    steps = np.diff(transl, axis=0)
+    reach = max(min(3, seam, len(steps) - seam), 1)
+    jump = steps[seam : seam + reach].mean(axis=0) - steps[seam - reach : seam].mean(axis=0)
+    distance = np.arange(len(steps)) - seam + 0.5
+    share = np.sign(distance) * minimum_jerk(1 - np.abs(distance) / blend) / 2
+    steps = steps - share[:, None] * jump
+    return np.concatenate([transl[:1], transl[0] + np.cumsum(steps, axis=0)])
+
+
+def best_seam(first: Motion, second: Motion, figure: Figure, search: int) -> tuple[int, int]:
     """Frame of `first` and frame of `second` between which the body differs least.
 
     Difference of root-aligned positions of feet, hands and head (m) and of their velocities (m/s).
     """
-    ends = np.arange(max(0, first.n_frames - blend - search), first.n_frames - blend)
-    starts = np.arange(min(search, second.n_frames - blend - 1))
+    ends = np.arange(max(1, first.n_frames - search), first.n_frames)
+    starts = np.arange(min(search, second.n_frames - 1))
     one, two = _features(first, figure)[ends], _features(second, figure)[starts]
     cost = np.linalg.norm(one[:, None] - two[None], axis=-1)
     row, column = np.unravel_index(int(cost.argmin()), cost.shape)
     return int(ends[row]), int(starts[column])
+
+
+def _bent_to(
+    motion: Motion,
+    frame: int,
+    pose: Float[np.ndarray, "22 3"],
+    transl: Float[np.ndarray, "3"],
+    share: Float[np.ndarray, " T"],
+) -> Motion:
+    """The motion with its state at `frame` moved to the one given, other frames by their share of it."""
+    own = to_matrix(motion.pose)
+    change = to_axis_angle(np.swapaxes(own[frame], -1, -2) @ to_matrix(pose))
+    moved = own @ to_matrix(change[None] * share[:, None, None])
+    shift = (transl - motion.transl[frame]) * share[:, None]
+    return dataclasses.replace(motion, pose=to_axis_angle(moved), transl=motion.transl + shift)
 
 
 def continue_from(motion: Motion, lead: Motion, frame: int) -> Motion:
@@ -94,4 +122,4 @@ def _features(motion: Motion, figure: Figure) -> Float[np.ndarray, "T D"]:
     place = (joints[:, _SEAM_JOINTS] - joints[:, :1]).reshape(motion.n_frames, -1)
     velocity = np.gradient(place, axis=0) * motion.fps
     parts = [_POSITION_WEIGHT * place, _VELOCITY_WEIGHT * velocity]
-    return np.concatenate(parts, axis=1) / np.sqrt(len(_SEAM_JOINTS))
+    return np.asarray(np.concatenate(parts, axis=1) / np.sqrt(len(_SEAM_JOINTS)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import torch
@@ -80,6 +81,7 @@ def figure_of(body_name: str) -> Figure:
 def measure(body: BodyModel) -> Figure:
     """Measures of any body model, taken from its zero pose."""
     joints = np.asarray(body.rest_joints, dtype=np.float64)
+    cached: Any = body
     zero = torch.zeros(1, 22, 3)
     rest = body.posed(zero, torch.zeros(1, 3)).vertices[0].double().numpy()
     soles = tuple(_thinned(body.regions[f"{side}_sole"]) for side in SIDES)
@@ -95,7 +97,7 @@ def measure(body: BodyModel) -> Figure:
         ankle_height=float(ankle[1] - ground),
         ball=joints[INDEX["left_foot"]] - ankle,
         heel=heel - ankle,
-        seat_offset=body_measures(body).seat_offset,
+        seat_offset=body_measures(cached).seat_offset,
         thigh_front=_thigh_front(rest, joints),
     )
 

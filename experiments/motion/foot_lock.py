@@ -21,6 +21,9 @@ _MIN_SPAN = 3
 _MAX_GAP = 2
 _STRAIGHT = 0.998
 _SETTLE_FRAMES = 4.0
+_EASE_FRAMES = 1.0
+_SWING_CLEARANCE_M = 0.02
+"""Toes clear the floor by one to two centimetres in mid-swing (Winter 1992); rigid feet scrape it."""
 
 
 def lock_feet(motion: Motion, figure: Figure, speed_limit: float = 0.35) -> Motion:
@@ -81,9 +84,25 @@ def _offsets(
         offsets[start:stop, :2] = drift.mean(axis=0) - drift
         offsets[start:stop, 2] = -lowest[start:stop]
     _ease_between(offsets, spans)
-    sunk = np.maximum(-(lowest + offsets[:, 2]), 0.0)
-    offsets[:, 2] += np.maximum(sunk, _above(sunk, 1.0))
+    short = _clearance(motion.n_frames, spans) - (lowest + offsets[:, 2])
+    offsets[:, 2] += np.maximum(short, 0.0)
+    # Contact starts and ends within a frame; the leg must not.
+    offsets = gaussian_filter1d(offsets, _EASE_FRAMES, axis=0, mode="nearest")
+    offsets[:, 2] += np.maximum(-(lowest + offsets[:, 2]), 0.0)
     return offsets
+
+
+def _swinging(n_frames: int, spans: list[tuple[int, int]]) -> Float[np.ndarray, " T"]:
+    """0 while the foot bears weight, 0 to 1 through each swing."""
+    phase = np.zeros(n_frames)
+    for (_, stop), (start, _) in itertools.pairwise([(0, 0), *spans, (n_frames, n_frames)]):
+        phase[stop:start] = (np.arange(stop, start) - stop + 1) / (start - stop + 1)
+    return phase
+
+
+def _clearance(n_frames: int, spans: list[tuple[int, int]]) -> Float[np.ndarray, " T"]:
+    """Least height of the sole: on the floor in contact, an arch over it in swing."""
+    return np.asarray(_SWING_CLEARANCE_M * np.sin(np.pi * _swinging(n_frames, spans)) ** 0.7)
 
 
 def _ease_between(offsets: Float[np.ndarray, "T 3"], spans: list[tuple[int, int]]) -> None:

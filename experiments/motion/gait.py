@@ -10,7 +10,6 @@ from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 
 from experiments.motion.capture import INDEX
-from experiments.motion.cleanup import BLENDED_SPEED_LIMIT
 from experiments.motion.compose import heading, join, rotate
 from experiments.motion.deepmimic import pybullet_clip, read_deepmimic
 from experiments.motion.figure import Figure
@@ -19,22 +18,27 @@ from experiments.motion.ground import ground
 from experiments.motion.motion import Motion
 from experiments.motion.resample import FPS, at_times, low_pass, mirror, resample, window
 from experiments.motion.retarget import retarget
-from experiments.motion.root import drive_root
-from experiments.motion.rotations import joint_positions, slerp, world_rotations
+from experiments.motion.rotations import about, joint_positions, slerp, world_rotations
 
-WALK, TURN_RIGHT, TURN_LEFT = "walker/0walk_forward", "walker/turn_right0", "walker/turn_left0"
+STEP_LEFT, STEP_RIGHT = "humanoid3d_walk[:19]", "~humanoid3d_walk[:19]"
+"""One step each; the clip's second half is the first one's mirror image with a jump at the seam."""
+WALK, MIRRORED_WALK = (STEP_LEFT, STEP_RIGHT), (STEP_RIGHT, STEP_LEFT)
+TURN_RIGHT, TURN_LEFT = "walker/turn_right0", "~walker/turn_right0"
+"""Two steps with a quarter turn; the left one mirrored. Both begin as STEP_LEFT (STEP_RIGHT) does."""
 _RAMP_S = 1.1
 _SLOWEST = 0.5
 """Share of the normal pace at which a walk starts and ends."""
+_SPEED_LIMIT = 0.5
 
 
 def gait(figure: Figure, clips: tuple[str, ...]) -> Motion:
-    """Recorded steps one after another (names of pybullet clips; `~` before a name mirrors it).
+    """Recorded steps one after another, cut to begin and end with the ankles side by side.
 
-    Cut to begin and end with the ankles side by side.
+    `clips` are names of pybullet clips; `[:n]` after a name takes the first n frames of its 30 a
+    second, `~` before it mirrors it.
     """
     parts = [_clip(figure, name) for name in clips]
-    whole = low_pass(reduce(lambda first, second: join(first, second, figure, 4, 6), parts))
+    whole = low_pass(reduce(lambda first, second: join(first, second, figure), parts))
     passing = _passing_frames(whole, figure)
     return window(whole, passing[0], passing[-1] + 1)
 
@@ -43,28 +47,45 @@ def walk_within(authored: Motion, steps: Motion, figure: Figure, start_s: float)
     """Insert a walk into an authored clip at `start_s`, where the person stands at ease.
 
     The standing time there is stretched by the walk's length. Amplitude and pace of the walk rise from
-    the standing pose and sink back to it; the root is driven by the feet, so the body travels only as
-    they push. Afterwards the authored clip goes on from where the walk has led.
+    the standing pose and sink back to it. Afterwards the authored clip goes on from where the walk led.
     """
     paced, amount = _paced(steps)
-    start = round(start_s * FPS)
-    length = paced.n_frames
-    clock = np.concatenate(
-        [np.arange(start), np.full(length, start), np.arange(start, authored.n_frames)]
-    )
-    # While walking the authored clip plays on in slow motion: breathing never freezes.
-    base = at_times(authored, clock / FPS, FPS)
+    start, length = round(start_s * FPS), paced.n_frames
+    # While walking the authored clip stands still at its state of `start_s`.
+    clock = [np.arange(start), np.full(length, start), np.arange(start, authored.n_frames)]
+    base = at_times(authored, np.concatenate(clock) / FPS, FPS)
     turn = np.zeros(base.n_frames)
     lead = heading(paced) - heading(paced)[0]
     turn[start : start + length] = gaussian_filter1d(lead, 8.0, mode="nearest")
     turn[start + length :] = lead[-1]
-    base = rotate(base, turn)
-    return _cleaned(_mixed(base, paced, amount, start), base, figure, start, length)
+    base = _turned_in_place(base, turn)
+    mixed = _mixed(base, paced, amount, start)
+    return lock_feet(_grounded(mixed, figure, start, length), figure, _SPEED_LIMIT)
+
+
+def _turned_in_place(motion: Motion, radians: Float[np.ndarray, " T"]) -> Motion:
+    """The motion with its heading turned by an angle a frame; its own small steps turn along."""
+    turned = rotate(motion, radians)
+    steps = np.diff(motion.transl, axis=0)
+    steps = (about("z", np.degrees(radians[1:])) @ steps[..., None])[..., 0]
+    path = motion.transl[0] + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    return dataclasses.replace(turned, transl=path)
+
+
+def _grounded(mixed: Motion, figure: Figure, start: int, length: int) -> Motion:
+    """On the floor while walking; before and after, the authored heights are right already."""
+    walking = np.zeros(mixed.n_frames)
+    walking[start : start + length] = 1.0
+    share = gaussian_filter1d(walking, 2.0)[:, None]
+    transl = mixed.transl * (1 - share) + ground(mixed, figure).transl * share
+    return dataclasses.replace(mixed, transl=transl)
 
 
 def _clip(figure: Figure, name: str) -> Motion:
-    motion = resample(retarget(read_deepmimic(pybullet_clip(name.removeprefix("~"))), figure))
-    return mirror(motion) if name.startswith("~") else motion
+    clip, _, stop = name.removeprefix("~").removesuffix("]").partition("[:")
+    motion = resample(retarget(read_deepmimic(pybullet_clip(clip)), figure))
+    part = window(motion, 0, int(stop) if stop else motion.n_frames)
+    return mirror(part) if name.startswith("~") else part
 
 
 def _passing_frames(motion: Motion, figure: Figure) -> list[int]:
@@ -90,24 +111,16 @@ def _paced(steps: Motion) -> tuple[Motion, Float[np.ndarray, " T"]]:
 
 
 def _mixed(base: Motion, paced: Motion, amount: Float[np.ndarray, " W"], start: int) -> Motion:
-    """Pose between standing and walking; height likewise; the root's path is settled afterwards."""
-    walk = slice(start, start + paced.n_frames)
+    """Standing and walking mixed by the amount of walking; half the swing of the legs, half the way.
+
+    Afterwards the standing clip goes on from where the walk has led.
+    """
+    walk, after = slice(start, start + paced.n_frames), start + paced.n_frames - 1
     pose, transl = base.pose.copy(), base.transl.copy()
     pose[walk] = slerp(base.pose[walk], paced.pose, np.repeat(amount[:, None], 22, axis=1))
     transl[walk, 2] = base.transl[walk, 2] * (1 - amount) + paced.transl[:, 2] * amount
+    stride = np.diff(paced.transl[:, :2], axis=0) * ((amount[1:] + amount[:-1]) / 2)[:, None]
+    steps = np.diff(base.transl[:, :2], axis=0)
+    steps[start:after] += stride
+    transl[1:, :2] = transl[0, :2] + np.cumsum(steps, axis=0)
     return dataclasses.replace(base, pose=pose, transl=transl)
-
-
-def _cleaned(mixed: Motion, base: Motion, figure: Figure, start: int, length: int) -> Motion:
-    """Feet drive the root while walking; before and after, the authored root's own steps are kept."""
-    grounded = ground(mixed, figure)
-    walking = np.zeros(mixed.n_frames)
-    walking[start : start + length] = 1.0
-    walking = gaussian_filter1d(walking, 2.0)[:, None]
-    height = mixed.transl[:, 2:] * (1 - walking) + grounded.transl[:, 2:] * walking
-    driven = np.diff(drive_root(grounded, figure).transl[:, :2], axis=0)
-    authored = np.diff(base.transl[:, :2], axis=0)
-    step = authored * (1 - walking[1:]) + driven * walking[1:]
-    path = base.transl[0, :2] + np.concatenate([np.zeros((1, 2)), np.cumsum(step, axis=0)])
-    moved = dataclasses.replace(mixed, transl=np.concatenate([path, height], axis=1))
-    return lock_feet(moved, figure, BLENDED_SPEED_LIMIT)

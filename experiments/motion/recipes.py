@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from experiments.motion.figure import Figure
-from experiments.motion.gait import TURN_RIGHT, WALK, gait, walk_within
+from experiments.motion.gait import MIRRORED_WALK, TURN_LEFT, TURN_RIGHT, WALK, gait, walk_within
 from experiments.motion.motion import Motion
 from experiments.motion.perform import perform
 from experiments.motion.phrases_sit import CHAIR, sit_and_look, sit_down, stand_up
@@ -13,17 +13,17 @@ from experiments.motion.score import Score
 
 def walk_straight(figure: Figure) -> Motion:
     """Stand, walk, stop."""
-    return _walk_and_stop(figure, (WALK, WALK, WALK), 11)
+    return _walk_and_stop(figure, WALK * 3, 11)
 
 
 def walk_turn_right(figure: Figure) -> Motion:
     """Walk, a quarter turn to the right, walk, stop."""
-    return _walk_and_stop(figure, (WALK, TURN_RIGHT, WALK), 12)
+    return _walk_and_stop(figure, (*WALK, TURN_RIGHT, *WALK), 12)
 
 
 def walk_turn_left(figure: Figure) -> Motion:
     """The same to the left: mirrored steps."""
-    return _walk_and_stop(figure, ("~" + WALK, "~" + TURN_RIGHT, "~" + WALK), 13)
+    return _walk_and_stop(figure, (*MIRRORED_WALK, TURN_LEFT, *MIRRORED_WALK), 13)
 
 
 def walk_turn_sit(figure: Figure) -> Motion:
@@ -32,7 +32,7 @@ def walk_turn_sit(figure: Figure) -> Motion:
     score.wait(1.2)
     sit_down(score, CHAIR)
     sit_and_look(score, 3.0)
-    return walk_within(perform(score, "", 14), gait(figure, (WALK, TURN_RIGHT)), figure, 0.6)
+    return walk_within(perform(score, "", 14), gait(figure, (*WALK, TURN_RIGHT)), figure, 0.6)
 
 
 def sit_stay_stand(figure: Figure) -> Motion:
