@@ -13,62 +13,23 @@ from typing import Any
 if __name__ == "__main__" and not __package__:  # started as a file: its folder is no package root
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-from analysis.codebook import read_codebook
-from analysis.exclusions import apply_rules, select_mode
-from analysis.preference import comparisons, preference_table
-from analysis.responses import read_responses
-from analysis.results import (
-    RESULTS_VERSION,
-    Results,
-    ordered,
-    preference_record,
-    read_results,
-    versions,
-    watermark,
-)
+from analysis.estimate import estimate
+from analysis.results import Results, ordered, read_results
 from renderer.files import write_bytes, write_json
 
-LEVEL = 0.95
 
-
-def analyze(responses_csv: Path, out: Path, *, seed: int = 0, mode: str | None = None) -> Results:
+def analyze(
+    responses_csv: Path, out: Path, *, seed: int = 0, mode: str | None = None,
+    catalogue: Path | None = None, bootstraps: int = 10_000,
+) -> Results:  # fmt: skip
     """Analyse one export and write every output into `out`; returns what `results.json` holds."""
     path = out / "results.json"
-    write_json(path, estimate(responses_csv, seed=seed, mode=mode))
+    write_json(path, estimate(
+        responses_csv, seed=seed, mode=mode, catalogue=catalogue, bootstraps=bootstraps,
+    ))  # fmt: skip
     results = read_results(path)
     write_outputs(results, out)
     return results
-
-
-def estimate(responses_csv: Path, *, seed: int = 0, mode: str | None = None) -> Results:
-    """All numbers of one export, as `results.json` holds them; writes nothing."""
-    codebook = read_codebook(responses_csv)
-    everything = read_responses(responses_csv)
-    responses, mode, other = select_mode(everything, mode)
-    analysed, flow = apply_rules(responses, codebook.rules, codebook.main_trials, other)
-    found = comparisons(analysed)
-    table = preference_table(found, LEVEL)
-    return {
-        "schema_version": RESULTS_VERSION,
-        "input": {
-            "file": responses_csv.name, "rows": len(everything), "mode": mode,
-            "study_id": everything.labels["study_id"][0],
-            "study_versions": list(everything.labels["study_version"]),
-            "collected": list(everything.started or ()),
-        },
-        "input_sha256": everything.sha256,
-        "rules": codebook.rules, "rules_origin": codebook.rules_origin,
-        "rules_sha256": codebook.rules_sha256,
-        "code_version": versions()["pace-study"], "versions": versions(),
-        "seed": seed, "level": LEVEL,
-        "simulated": mode == "simulated", "frozen": codebook.frozen,
-        "watermark": watermark(mode, codebook.frozen),
-        "targets": sorted({comparison.target for comparison in found}),
-        "flow": {**vars(flow)},
-        "order": sorted(table, key=lambda name: (-table[name].rate, name)),
-        "baselines": {name: preference_record(row) for name, row in table.items()},
-        "warnings": [],
-    }  # fmt: skip
 
 
 def write_outputs(results: Results, out: Path) -> None:

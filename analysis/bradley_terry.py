@@ -68,7 +68,7 @@ def fit_scale(duels: Duels, count: int, *, link: Link = "logit", order: bool = F
     design = _design(first, second, count, order)
     beta = np.zeros(design.shape[1])
     for _ in range(MAX_STEPS):
-        gradient, information, _ = _score(design, beta, wins, answers, link)
+        gradient, information = _score(design, beta, wins, answers, link)
         step = np.linalg.solve(information, gradient)
         beta += step * min(1.0, 4 / max(np.abs(step).max(), 1e-12))
         if np.abs(step).max() < 1e-10:
@@ -94,10 +94,14 @@ def clustered_covariance(
     """Sandwich covariance of the abilities, clustered; equals R's `vcovCL(type = "HC1")`."""
     count, order = len(scale.ability), scale.order is not None
     beta = scale.ability[1:] if scale.order is None else np.append(scale.ability[1:], scale.order)
-    design = _design(duels.first, duels.second, count, order)
-    _, information, slope = _score(design, beta, duels.wins, duels.answers, link)
+    first, second, wins, answers = _ordered_pairs(duels, count)
+    information = _score(_design(first, second, count, order), beta, wins, answers, link)[1]
+    eta = scale.ability[duels.first] - scale.ability[duels.second] + (scale.order or 0.0)
+    slope = _slope(eta, duels.wins, duels.answers, link)
     groups = int(clusters.max()) + 1
-    scores = np.column_stack([np.bincount(clusters, slope * c, groups) for c in design.T])
+    scores = _cluster_sums(duels, clusters, slope, count)
+    if order:
+        scores = np.column_stack([scores, np.bincount(clusters, slope, groups)])
     bread = np.linalg.inv(information)
     n, k = duels.answers.sum(), len(beta)
     factor = groups / (groups - 1) * (n - 1) / (n - k)
@@ -198,16 +202,36 @@ def _design(
     return np.column_stack([design, np.ones(len(first))]) if order else design
 
 
+def _cluster_sums(
+    duels: Duels, clusters: Int[np.ndarray, "D"], slope: Float[np.ndarray, "D"], count: int
+) -> Float[np.ndarray, "G L"]:
+    """Score of every ability but the reference's, summed by cluster, without a design matrix."""
+    groups, key = int(clusters.max()) + 1, clusters.astype(np.int64) * count
+    sums = np.bincount(key + duels.first, slope, groups * count)
+    sums -= np.bincount(key + duels.second, slope, groups * count)
+    return sums.reshape(groups, count)[:, 1:]
+
+
+def _slope(
+    eta: Float[np.ndarray, "D"],
+    wins: Float[np.ndarray, "D"],
+    answers: Float[np.ndarray, "D"],
+    link: Link,
+) -> Float[np.ndarray, "D"]:
+    rate, density = _MEANS[link](eta)
+    return np.asarray((wins - answers * rate) * density / np.maximum(rate * (1 - rate), 1e-300))
+
+
 def _score(
     design: Float[np.ndarray, "D Q"], beta: Float[np.ndarray, "Q"], wins: Float[np.ndarray, "D"],
     answers: Float[np.ndarray, "D"], link: Link,
-) -> tuple[Float[np.ndarray, "Q"], Float[np.ndarray, "Q Q"], Float[np.ndarray, "D"]]:  # fmt: skip
+) -> tuple[Float[np.ndarray, "Q"], Float[np.ndarray, "Q Q"]]:  # fmt: skip
     """Gradient and expected information of the log likelihood, and each row's slope."""
     rate, density = _MEANS[link](design @ beta)
     variance = np.maximum(rate * (1 - rate), 1e-300)
-    slope = (wins - answers * rate) * density / variance
+    gradient = design.T @ _slope(design @ beta, wins, answers, link)
     information = (design.T * (answers * density**2 / variance)) @ design
-    return design.T @ slope, information, slope
+    return gradient, information
 
 
 def _logistic(eta: Float[np.ndarray, "D"]) -> tuple[Float[np.ndarray, "D"], Float[np.ndarray, "D"]]:

@@ -18,6 +18,11 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 @click.argument("responses", type=FILE)
 @click.option("--out", type=FOLDER, required=True, help="Folder for results.json, tables, figures.")
 @click.option(
+    "--catalogue",
+    type=click.Path(path_type=Path),
+    help="Stimulus set (catalogue.json or its folder): do its scores predict preference?",
+)
+@click.option(
     "--mode",
     type=click.Choice(["live", "pilot", "preview", "simulated"]),
     help="Which answers to analyse; default: live, or the only mode there is.",
@@ -25,14 +30,24 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the bootstrap."
 )
+@click.option(
+    "--bootstraps",
+    type=click.IntRange(100),
+    default=10_000,
+    show_default=True,
+    help="Draws of participants for the bootstrap intervals.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")  # fmt: skip
-def analyze(responses: Path, out: Path, mode: str | None, seed: int, as_json: bool) -> None:
+def analyze(
+    responses: Path, out: Path, catalogue: Path | None, mode: str | None, seed: int,
+    bootstraps: int, as_json: bool,
+) -> None:  # fmt: skip
     """Turn the answers in RESPONSES (responses.csv) into preference tables, figures and a report."""
     from analysis.analyze import analyze as run
     from analysis.analyze import summary
     from analysis.tables import terminal_table
 
-    results = run(responses, out, seed=seed, mode=mode)
+    results = run(responses, out, seed=seed, mode=mode, catalogue=catalogue, bootstraps=bootstraps)
     if as_json:
         click.echo(json.dumps(summary(results, out)))
         return

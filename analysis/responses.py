@@ -56,6 +56,8 @@ class Responses:
 
     def take(self, keep: Bool[np.ndarray, "N"]) -> Responses:
         """The same answers with only the rows in `keep`; labels stay, so codes stay comparable."""
+        if keep.all():
+            return self
         return replace(
             self,
             codes={name: values[keep] for name, values in self.codes.items()},

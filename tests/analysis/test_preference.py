@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis import display
-from analysis.analyze import estimate
+from analysis.estimate import estimate
 from analysis.preference import comparisons
 from analysis.responses import read_responses
 from analysis.tables import terminal_table
