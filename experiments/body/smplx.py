@@ -46,21 +46,22 @@ def load_smplx(path: Path, betas: Sequence[float] = ()) -> BodyModel:
     points, turned = _merged(arrays["weights"], vertices, joints, local, parents)
     # Finger vertices hang on the wrist alone once merged, so their corrections turn with the finger.
     offsets = np.einsum("vab,vbf->vaf", turned, arrays["posedirs"][:, :, :189])
-    return _body(path, arrays["f"], points, joints[:22], offsets)
+    return _body(path, arrays, points, joints[:22], offsets)
 
 
 def _body(
     path: Path,
-    faces: Integer[np.ndarray, "F 3"],
+    arrays: dict[str, Any],
     points: Float[np.ndarray, "V 22 4"],
     joints: Float[np.ndarray, "22 3"],
     offsets: Float[np.ndarray, "V 3 189"],
 ) -> SkinnedBody:
+    faces = arrays["f"]
     component = largest_component(faces)
     skin = faces[np.isin(faces, component).all(axis=1)]
     rest = points[:, :, :3].sum(axis=1)
     regions = body_regions(rest, skin, points[:, :, 3], joints)
-    subset, subset_faces = _small_mesh(path, rest, skin)
+    subset, subset_faces = _small_mesh(path, arrays["v_template"], skin)
     return SkinnedBody(
         name=path.stem,
         faces=faces,
@@ -121,14 +122,15 @@ def _small_mesh(
         with atomic_path(cached) as temporary:
             np.savez(temporary, subset=subset, faces=small)
     with np.load(cached, allow_pickle=False) as archive:
-        return archive["subset"], archive["faces"]
+        return np.asarray(archive["subset"]), np.asarray(archive["faces"])
 
 
 def _arrays(path: Path) -> dict[str, Any]:
     """The arrays used here; the others of the file are left alone (some are pickled objects)."""
     wanted = ("v_template", "shapedirs", "posedirs", "J_regressor", "weights", "kintree_table", "f")
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # numpy leaves a file that it opened itself and cannot read dangling
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             missing = [name for name in wanted if name not in archive.files]
             if missing:
                 raise InputError(path, missing[0], "nothing", "this array of an SMPL-X model")
@@ -192,7 +194,7 @@ def _array(path: Path, name: str, value: Any, shape: tuple[int | None, ...]) -> 
 
 def _parents(path: Path, table: Integer[np.ndarray, "2 55"]) -> Integer[np.ndarray, " 55"]:
     """Parent of every joint; the first 22 must be the SMPL-X body joints in their order."""
-    parents = table[0].copy()
+    parents = np.array(table[0])
     parents[0] = -1
     if tuple(parents[:22].tolist()) != PARENTS:
         raise InputError(path, "kintree_table", parents[:22].tolist(), f"the parents {PARENTS}")
