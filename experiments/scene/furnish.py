@@ -13,11 +13,15 @@ from experiments.scene.objects import MaterialPart, PlacedObject
 from experiments.scene.pack import Pack, Piece, default_pack
 from experiments.scene.parametric import make_shape
 from experiments.scene.scene import MPCAT40
-from experiments.scene.settle import settled_height
+from experiments.scene.settle import settled_height, surface_heights
 from renderer.files import InputError
 
 SOFT_ASSETS = frozenset({"shape:cushion", "shape:blanket", "pack:teddy_bear_51"})
 """Things that may sink some centimetres into what they lie on."""
+DRAPED = frozenset({"blanket"})
+"""Shapes that follow the surface they lie on and hang over its edge."""
+_HANG = 0.22
+"""Metres that a draped cloth hangs down at most."""
 
 
 def furnish(layout: Layout, pack: Pack | None = None) -> tuple[PlacedObject, ...]:
@@ -39,13 +43,17 @@ def place(
     """Make one object and stand it where its item says; its support must be in `placed`."""
     bodies = _own_frame(item, pack, source)
     turn = _yaw_matrix(item.yaw)
-    points = np.concatenate([body.corners.reshape(-1, 3) for body in bodies]) @ turn.T
-    z = _height(item, points, placed, source)
+    bodies = tuple(
+        replace(b, corners=b.corners @ turn.T, normals=b.normals @ turn.T) for b in bodies
+    )
+    z = _height(item, bodies, placed, source)
     shift = np.array([item.x, item.y, z])
+    if item.shape in DRAPED and item.on is not None:
+        bodies = tuple(_draped(b, placed[item.on].triangles(), shift) for b in bodies)
     parts = tuple(
         MaterialPart(
-            corners=body.corners @ turn.T + shift,
-            normals=body.normals @ turn.T,
+            corners=body.corners + shift,
+            normals=body.normals,
             colour=body.colour,
             uv=body.uv,
             texture=body.texture,
@@ -64,8 +72,13 @@ def place(
         parts=parts,
         on=item.on,
         wall=item.wall,
-        soft=item.asset in SOFT_ASSETS or MPCAT40[item.label] == "cushion",
+        soft=is_soft(item),
     )
+
+
+def is_soft(item: Item) -> bool:
+    """Whether the thing gives way: it settles on the middle height below it and may sink in."""
+    return item.asset in SOFT_ASSETS or MPCAT40[item.label] == "cushion"
 
 
 @dataclass(frozen=True)
@@ -121,7 +134,7 @@ def _with_normals(bodies: tuple[_Body, ...]) -> tuple[_Body, ...]:
 
 def _height(
     item: Item,
-    points: Float[np.ndarray, "N 3"],
+    bodies: tuple[_Body, ...],
     placed: dict[str, PlacedObject],
     source: object,
 ) -> float:
@@ -130,12 +143,27 @@ def _height(
         return item.z
     if item.on is None:
         return 0.0
+    points = np.concatenate([body.corners.reshape(-1, 3) for body in bodies])
     width, depth, _ = np.ptp(points, axis=0)
     triangles = placed[item.on].triangles()
-    height = settled_height(triangles, item.x, item.y, (float(width), float(depth)))
+    size = (float(width), float(depth))
+    height = settled_height(triangles, item.x, item.y, size, 0.5 if is_soft(item) else 0.8)
     if np.isnan(height):
         raise InputError(source, f"{item.id}.on", item.on, "a support under the object's middle")
     return height
+
+
+def _draped(
+    body: _Body, support: Float[np.ndarray, "F 3 3"], shift: Float[np.ndarray, " 3"]
+) -> _Body:
+    """Raise or lower every corner by the support's height below it, relative to the middle."""
+    points = (body.corners + shift).reshape(-1, 3)[:, :2]
+    distinct, index = np.unique(np.round(points, 6), axis=0, return_inverse=True)
+    below = surface_heights(support, distinct) - shift[2]
+    rise = np.clip(np.nan_to_num(below, nan=-_HANG), -_HANG, _HANG)[index.reshape(-1)]
+    corners = body.corners.copy()
+    corners[..., 2] += rise.reshape(-1, 3)
+    return replace(body, corners=corners, normals=creased_normals(corners, 75.0))
 
 
 def _tinted(bodies: tuple[_Body, ...], tint: Colour) -> tuple[_Body, ...]:

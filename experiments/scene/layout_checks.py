@@ -11,6 +11,7 @@ from jaxtyping import Float
 from scipy.spatial import cKDTree
 
 from experiments.scene.enclosure import enclosed
+from experiments.scene.exact import nearest_triangle
 from experiments.scene.objects import PlacedObject
 from experiments.scene.scene import MPCAT40
 from experiments.scene.settle import settled_height, surface_heights
@@ -21,6 +22,8 @@ OVERLAP, OVERLAP_SOFT = 0.012, 0.06
 """Metres that one object may reach into another; soft things sink in."""
 _OVERLAP_POINTS = 5
 _GAP = 0.012
+_ROD = 0.08
+"""Metres between a wall and the curtains that hang before it."""
 _OUTSIDE = 0.005
 _REACH = 0.45
 """Metres from the walkable floor within which a seat counts as reachable."""
@@ -86,7 +89,7 @@ class LayoutReport:
             ("free floor", self.free_floor, 0.35, 0.65),
             ("walkable share", self.walkable, 0.08, 0.25),
             ("largest walkable component", self.largest_component, 0.6, 1.0),
-            ("places to sit", self.sit, 6, np.inf),
+            ("places to sit", self.sit, 5, np.inf),
             ("places to lean on", self.lean, 3, np.inf),
             ("seats out of reach", len(self.unreached), 0, 2),
         ]
@@ -102,12 +105,16 @@ class LayoutReport:
         ]
         found += [f"{name} floats" for name in self.floating]
         found += [f"{name} is outside the room" for name in self.outside]
-        found += [f"{name} has its seat at {self.seat_heights[name]:.2f} m" for name in self.wrong_seats]
+        found += [
+            f"{name} has its seat at {self.seat_heights[name]:.2f} m" for name in self.wrong_seats
+        ]
         return found
 
     def as_json(self) -> dict[str, Any]:
         """The report as one JSON object; lengths in metres."""
-        overlaps = [{"a": o.a, "b": o.b, "depth": round(o.depth, 4), "soft": o.soft} for o in self.overlaps]
+        overlaps = [
+            {"a": o.a, "b": o.b, "depth": round(o.depth, 4), "soft": o.soft} for o in self.overlaps
+        ]
         return {
             "scene": self.name,
             "triangles": self.triangles,
@@ -209,23 +216,24 @@ def _depth(
     deep = near[distance > OVERLAP]
     if len(deep) < _OVERLAP_POINTS:
         return 0.0
-    inside = distance[distance > OVERLAP][enclosed(triangles, deep)]
-    return float(np.sort(inside)[-_OVERLAP_POINTS]) if len(inside) >= _OVERLAP_POINTS else 0.0
+    inside = enclosed(triangles, deep)
+    order = np.argsort(-distance[distance > OVERLAP][inside], kind="stable")[: 4 * _OVERLAP_POINTS]
+    exact = sorted(nearest_triangle(point, triangles)[0] for point in deep[inside][order])
+    return exact[-_OVERLAP_POINTS] if len(exact) >= _OVERLAP_POINTS else 0.0
 
 
-def floating(
-    objects: Sequence[PlacedObject], size: tuple[float, float, float]
-) -> Iterator[str]:
+def floating(objects: Sequence[PlacedObject], size: tuple[float, float, float]) -> Iterator[str]:
     """Objects that touch neither the floor, nor their support, nor their wall within 12 mm."""
     by_id = {placed.id: placed for placed in objects}
     for placed in objects:
         triangles = placed.triangles()
         if placed.wall is not None:
             gap = _wall_gap(triangles, placed.wall, size)
+            gap -= _ROD if MPCAT40[placed.label] == "curtain" else 0.0
         elif placed.on is None:
             gap = abs(float(triangles[..., 2].min()))
         else:
-            gap = _support_gap(triangles, by_id[placed.on].triangles())
+            gap = _support_gap(triangles, by_id[placed.on].triangles(), placed.soft)
         if gap > _GAP:
             yield placed.id
 
@@ -239,23 +247,24 @@ def _wall_gap(
 
 
 def _support_gap(
-    triangles: Float[np.ndarray, "F 3 3"], support: Float[np.ndarray, "G 3 3"]
+    triangles: Float[np.ndarray, "F 3 3"], support: Float[np.ndarray, "G 3 3"], soft: bool
 ) -> float:
-    """Smallest gap between the lowest points and the support; infinite if most of them hang over."""
+    """Smallest gap between the lowest points and the support; infinite if most of them hang over.
+
+    Of soft things all points count: they may hang over an edge, as blankets do.
+    """
     points = triangles.reshape(-1, 3)
-    lowest = points[points[:, 2] < points[:, 2].min() + 0.01]
-    lowest = lowest[:: max(1, len(lowest) // 60)]
+    lowest = points if soft else points[points[:, 2] < points[:, 2].min() + 0.01]
+    lowest = lowest[:: max(1, len(lowest) // 200)]
     under = surface_heights(support, lowest[:, :2])
     gap = lowest[:, 2] - under
     carried = np.abs(gap) < 0.05
-    if carried.mean() < 0.5:
+    if not carried.any() or (not soft and carried.mean() < 0.5):
         return float("inf")
     return float(np.min(np.abs(gap[carried])))
 
 
-def outside(
-    objects: Sequence[PlacedObject], size: tuple[float, float, float]
-) -> Iterator[str]:
+def outside(objects: Sequence[PlacedObject], size: tuple[float, float, float]) -> Iterator[str]:
     """Objects that reach more than 5 mm through a wall."""
     for placed in objects:
         triangles = placed.triangles()

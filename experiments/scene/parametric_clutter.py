@@ -216,7 +216,7 @@ def pouf(
     return (part(colour, surface(grid) * np.array(size)),)
 
 
-def backpack(*, colour: Colour = (0.34, 0.39, 0.44)) -> tuple[ShapePart, ...]:
+def backpack(*, colour: Colour = (0.42, 0.37, 0.28)) -> tuple[ShapePart, ...]:
     """A backpack standing on its base, front pocket towards -y."""
     body = turned(superellipsoid((0.31, 0.17, 0.44), flat=0.35, square=0.5, n=24), "x", -5)
     pocket = superellipsoid((0.23, 0.10, 0.20), (0, -0.085, 0.04), 0.35, 0.45, 18)
@@ -259,9 +259,7 @@ def vase(*, height: float = 0.24, colour: Colour = (0.58, 0.62, 0.60)) -> tuple[
     return (part(colour, height * lathe(list(zip(r, z, strict=True)), 24)),)
 
 
-def glass(
-    *, height: float = 0.11, colour: Colour = (0.66, 0.72, 0.72)
-) -> tuple[ShapePart, ...]:
+def glass(*, height: float = 0.11, colour: Colour = (0.66, 0.72, 0.72)) -> tuple[ShapePart, ...]:
     """A drinking glass or beaker."""
     profile = [(0.27, 0.0), (0.34, 1.0), (0.31, 1.0), (0.25, 0.08)]
     return (part(colour, height * lathe(profile, 20)),)

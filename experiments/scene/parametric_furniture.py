@@ -93,7 +93,7 @@ def bench(
     pad = (width - 0.04) / n_pads
     lefts = -(width - 0.04) / 2 + pad * (np.arange(n_pads) + 0.5)
     seats = [
-        superellipsoid((pad - 0.004, depth - back, cushion), (x, -back / 2, seat - cushion), 0.3, 0.18, 16)
+        superellipsoid((pad - 0.004, depth - back, cushion), (x, -back / 2, seat - cushion), 0.18, 0.18, 16)
         for x in lefts
     ]  # fmt: skip
     return (
@@ -195,7 +195,7 @@ def drawers(
     return part(colour, body, *faces), part(METAL, *handles), part(DARK, plinth)
 
 
-def swivel(*, seat: float = 0.46, colour: Colour = (0.24, 0.27, 0.30)) -> tuple[ShapePart, ...]:
+def swivel(*, seat: float = 0.46, colour: Colour = (0.27, 0.27, 0.28)) -> tuple[ShapePart, ...]:
     """An office swivel chair: five-star foot with castors, padded seat and back, arm rests."""
     foot = [cylinder(0.035, 0.10, (0, 0, 0.05), 14), cylinder(0.026, seat - 0.2, (0, 0, 0.12), 12)]
     castors = []
@@ -224,7 +224,7 @@ def swivel(*, seat: float = 0.46, colour: Colour = (0.24, 0.27, 0.30)) -> tuple[
 def board(*, size: Size3 = (1.25, 0.42, 1.75)) -> tuple[ShapePart, ...]:
     """A whiteboard in a metal frame on two feet."""
     width, depth, height = size
-    panel = box((width - 0.06, 0.018, 0.62 * height), (0, 0, 0.36 * height))
+    panel = box((width - 0.03, 0.012, 0.62 * height), (0, -0.014, 0.36 * height))
     frame = [
         box((width, 0.03, 0.03), (0, 0, 0.36 * height - 0.03)),
         box((width, 0.03, 0.03), (0, 0, 0.98 * height)),

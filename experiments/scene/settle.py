@@ -11,12 +11,16 @@ _RAYS = 5
 
 
 def settled_height(
-    support: Float[np.ndarray, "F 3 3"], x: float, y: float, footprint: tuple[float, float]
+    support: Float[np.ndarray, "F 3 3"],
+    x: float,
+    y: float,
+    footprint: tuple[float, float],
+    quantile: float = 0.5,
 ) -> float:
     """Height of a support under the middle of a footprint centred on (x, y), metres.
 
-    The median of 5 x 5 downward rays over a patch of 0.35 times the smaller side, rounded to a
-    tenth of a millimetre. NaN where the support lies under fewer than half of the rays.
+    The median (or another quantile) of 5 x 5 downward rays over a patch of 0.35 times the smaller
+    side, rounded to a tenth of a millimetre. NaN where the support lies under fewer than half of the rays.
     """
     reach = 0.5 * _PATCH * min(footprint)
     steps = np.linspace(-reach, reach, _RAYS)
@@ -24,7 +28,7 @@ def settled_height(
     heights = surface_heights(support, grid)
     if np.isnan(heights).sum() * 2 > len(heights):
         return float("nan")
-    return round(float(np.nanmedian(heights)), 4)
+    return round(float(np.nanquantile(heights, quantile)), 4)
 
 
 def surface_heights(

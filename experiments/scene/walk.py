@@ -80,9 +80,7 @@ def walk_map(
     return WalkMap(obstacle, walkable, _regions(walkable), cell)
 
 
-def _mark(
-    obstacle: Bool[np.ndarray, "X Y"], points: Float[np.ndarray, "N 3"], cell: float
-) -> None:
+def _mark(obstacle: Bool[np.ndarray, "X Y"], points: Float[np.ndarray, "N 3"], cell: float) -> None:
     """Set the cells under the points."""
     index = np.floor(points[:, :2] / cell).astype(int)
     inside = np.all((index >= 0) & (index < obstacle.shape), axis=1)
