@@ -35,18 +35,18 @@ def analyze(
 def write_outputs(results: Results, out: Path) -> None:
     """Write csv, Markdown, LaTeX, figures and the HTML report from `results` alone."""
     from analysis import figures, latex, report, tables
+    from analysis.prose import markdown_report
 
-    mark = results["watermark"]
-    pages = [tables.markdown(table, mark) for table in tables.all_tables(results)]
-    _text(out / "report.md", "\n".join(pages))
-    _text(out / "preference.csv", tables.tidy_csv(results["baselines"], "comparison", mark))
+    _text(out / "report.md", markdown_report(results))
+    for name, content in tables.all_csv(results).items():
+        _text(out / "csv" / f"{name}.csv", content)
     _text(out / "results.tex", latex.macros(results))
     _text(out / "preference.tex", latex.preference_tex(results))
     drawings: dict[str, bytes] = {}
     for name, figure in figures.all_figures(results).items():
         files = figures.draw(figure, results)
-        for kind, content in files.items():
-            write_bytes(out / "figures" / f"{name}.{kind}", content)
+        for kind, drawing in files.items():
+            write_bytes(out / "figures" / f"{name}.{kind}", drawing)
         drawings[name] = files["svg"]
     _text(out / "report.html", report.html_report(results, drawings))
 

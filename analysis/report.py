@@ -5,12 +5,25 @@ from __future__ import annotations
 import html
 import re
 
+from analysis.figures import CAPTIONS
+from analysis.prose import checklist, methods_paragraph, results_paragraph
 from analysis.results import Results
-from analysis.tables import all_tables, html_table
+from analysis.tables import Table, all_tables, html_table
+
+_SECTIONS = (
+    ("Result", ("preference",), ("forest", "shares")),
+    ("Methods", (), ()),
+    ("How sure is it?", ("intervals", "effects", "differences"), ("participants",)),
+    ("Scenes", ("scenes",), ("scenes",)),
+    ("From the file to the analysis", ("flow", "quality"), ()),
+    ("Does it hang on something?", ("sensitivity",), ()),
+    ("Agreement and scale", ("reliability", "scale"), ("scale",)),
+    ("Link to the metrics", ("metrics",), ()),
+)
 
 _CSS = """
 body{font:16px/1.5 system-ui,-apple-system,"Segoe UI",sans-serif;color:#1a1a1a;background:#fff;
-max-width:60rem;margin:0 auto;padding:1.5rem}
+max-width:66rem;margin:0 auto;padding:1.5rem}
 h1{font-size:1.6rem;margin:.2rem 0}h2{font-size:1.2rem;margin:2.2rem 0 .5rem;border-bottom:1px solid #c9c9c9}
 .mark{background:#fff1e5;border:2px solid #c05a00;
 color:#7a3800;font-weight:700;padding:.5rem .8rem;margin:1rem 0}
@@ -21,6 +34,8 @@ thead th{border-top:2px solid #1a1a1a;border-bottom:1px solid #1a1a1a;text-align
 thead th:first-child,tbody th{text-align:left;font-weight:400}
 tbody tr:last-child>*{border-bottom:2px solid #1a1a1a}
 th,td{padding:.28rem .6rem}td{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
+.words th,.words td,.words thead th{text-align:left;white-space:normal}
+dt{font-weight:600;margin-top:.6rem}dd{margin:0 0 0 1rem}
 .note,figcaption,footer{font-size:.85rem;color:#4a4a4a}
 figure{margin:1rem 0}figure svg{max-width:100%;height:auto}
 code{font-size:.85em;overflow-wrap:anywhere}
@@ -34,12 +49,18 @@ def html_report(results: Results, figures: dict[str, bytes]) -> str:
     title = f"Preference report: {results['input']['study_id']}"
     mark = results["watermark"]
     banner = f'<p class="mark" role="note">{html.escape(mark)}</p>' if mark else ""
-    tables = [f'<div class="scroll">{html_table(table)}</div>' for table in all_tables(results)]
-    body = [
-        f"<h1>{html.escape(title)}</h1>", banner, _warnings(results),
-        "<h2>Result</h2>", tables[0], *[_figure(name, svg) for name, svg in figures.items()],
-        "<h2>More</h2>", *tables[1:], _footer(results),
-    ]  # fmt: skip
+    tables = {table.name: table for table in all_tables(results)}
+    body = [f"<h1>{html.escape(title)}</h1>", banner, _warnings(results)]
+    for heading, names, pictures in _SECTIONS:
+        parts = [_part(tables[name]) for name in names if name in tables]
+        parts += [_figure(name, figures[name]) for name in pictures if name in figures]
+        if heading == "Result":
+            parts.insert(0, f"<p>{html.escape(results_paragraph(results))}</p>")
+        if heading == "Methods":
+            parts.append(f"<p>{html.escape(methods_paragraph(results))}</p>")
+        if parts:
+            body += [f"<h2>{heading}</h2>", *parts]
+    body += ["<h2>A reviewer's questions</h2>", _checklist(results), _footer(results)]
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -58,8 +79,22 @@ def inline_svg(svg: bytes, label: str, prefix: str) -> str:
     return text.replace("<svg", f'<svg role="img" aria-label="{html.escape(label)}"', 1)
 
 
+def _part(table: Table) -> str:
+    return f'<div class="scroll">{html_table(table)}</div>'
+
+
+def _checklist(results: Results) -> str:
+    rows = "".join(
+        f"<dt>{html.escape(question)}</dt><dd>{html.escape(answer)}</dd>\n"
+        for question, answer in checklist(results)
+    )
+    return f"<dl>{rows}</dl>"
+
+
 def _figure(name: str, svg: bytes) -> str:
-    return f"<figure>{inline_svg(svg, name, name + '-')}</figure>"
+    caption = CAPTIONS[name]
+    picture = inline_svg(svg, caption, name + "-")
+    return f"<figure>{picture}<figcaption>{html.escape(caption)}</figcaption></figure>"
 
 
 def _warnings(results: Results) -> str:

@@ -23,6 +23,8 @@ class Table:
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    words: bool = False
+    """All columns hold words and are set flush left."""
 
 
 def preference_table(results: Results) -> Table:
@@ -74,8 +76,15 @@ def flow_table(results: Results) -> Table:
 
 
 def all_tables(results: Results) -> list[Table]:
-    """Every table of the report, in reading order."""
-    return [preference_table(results), flow_table(results)]
+    """Every table of the report that has rows, in reading order."""
+    from analysis import more_tables as more
+
+    builders = (
+        preference_table, more.interval_table, more.effect_table, more.difference_table,
+        more.scene_table, flow_table, more.quality_table, more.sensitivity_table,
+        more.reliability_table, more.scale_table, more.metric_table,
+    )  # fmt: skip
+    return [table for table in (build(results) for build in builders) if table.rows]
 
 
 def terminal_table(results: Results) -> str:
@@ -107,15 +116,44 @@ def html_table(table: Table) -> str:
     )
     note = f'<p class="note">{html.escape(table.note)}</p>' if table.note else ""
     caption = f"<caption>{html.escape(table.title)}</caption>"
-    return f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table>{note}"
+    kind = ' class="words"' if table.words else ""
+    return (
+        f"<table{kind}>{caption}<thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table>{note}"
+    )
 
 
-def tidy_csv(records: dict[str, dict[str, Any]], key: str, mark: str) -> str:
+def all_csv(results: Results) -> dict[str, str]:
+    """Tidy files of unrounded values, one per table, by name."""
+    rows = ordered(results)
+    nested = {
+        "scenes": "scenes", "stimuli": "stimuli_rates",
+    }  # fmt: skip
+    files = {"preference": [{"comparison": name} | _main_values(row) for name, row in rows]}
+    for file, key in nested.items():
+        files[file] = [{"comparison": name} | inner for name, row in rows for inner in row[key]]
+    files["participants"] = [
+        {"comparison": name, "k": k, "n": n}
+        for name, row in rows
+        for k, n in row["participant_counts"]
+    ]
+    files["sensitivity"] = [
+        {"comparison": name} | inner
+        for name in results["order"]
+        for inner in results["sensitivity"][name]
+    ]
+    files["differences"] = results["differences"]
+    files["scale"] = results["scale"]["methods"]
+    files["metrics"] = [{"metric": m} | r for m, r in results["metrics"]["metrics"].items()]
+    mark = results["watermark"]
+    return {name: tidy_csv(records, mark) for name, records in files.items() if records}
+
+
+def tidy_csv(records: list[dict[str, Any]], mark: str) -> str:
     """Unrounded values, one record a row, the watermark in a column of its own.
 
     Text that a spreadsheet would run as a formula is preceded by an apostrophe.
     """
-    flat = [{key: name} | _flatten(record) for name, record in records.items()]
+    flat = [_flatten(record) for record in records]
     names = list(dict.fromkeys(column for record in flat for column in record))
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
@@ -124,6 +162,12 @@ def tidy_csv(records: dict[str, dict[str, Any]], key: str, mark: str) -> str:
         cells = [_safe(record.get(name, "")) for name in names]
         writer.writerow([*cells, mark or "final"])
     return stream.getvalue()
+
+
+def _main_values(row: dict[str, Any]) -> dict[str, Any]:
+    """A row of the main table without its nested tables."""
+    nested = ("scenes", "stimuli_rates", "participant_counts", "display")
+    return {name: value for name, value in row.items() if name not in nested}
 
 
 def _flatten(record: dict[str, Any]) -> dict[str, Any]:
