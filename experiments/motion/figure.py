@@ -39,6 +39,10 @@ class Figure:
     """Height of the hip centre above a hard seat."""
     thigh_front: float
     """From the thigh's axis to its skin, in front, three quarters of the way to the knee."""
+    back_offset: float
+    """Height of the hip centre above a hard floor, lying on the back."""
+    belly_front: float
+    """From the hip centre forwards to the skin of the belly a hand's breadth above it."""
 
     @property
     def leg(self) -> tuple[float, float]:
@@ -82,6 +86,7 @@ def measure(body: BodyModel) -> Figure:
     """Measures of any body model, taken from its zero pose."""
     joints = np.asarray(body.rest_joints, dtype=np.float64)
     cached: Any = body
+    hips = joints[[INDEX["left_hip"], INDEX["right_hip"]]].mean(axis=0)
     zero = torch.zeros(1, 22, 3)
     rest = body.posed(zero, torch.zeros(1, 3)).vertices[0].double().numpy()
     soles = tuple(_thinned(body.regions[f"{side}_sole"]) for side in SIDES)
@@ -99,7 +104,15 @@ def measure(body: BodyModel) -> Figure:
         heel=heel - ankle,
         seat_offset=body_measures(cached).seat_offset,
         thigh_front=_thigh_front(rest, joints),
+        back_offset=float(hips[2] - rest[body.regions["buttocks"], 2].min()),
+        belly_front=_belly_front(rest, hips),
     )
+
+
+def _belly_front(rest: Float[np.ndarray, "V 3"], hips: Float[np.ndarray, "3"]) -> float:
+    above = rest[:, 1] - hips[1]
+    near = (above > 0.08) & (above < 0.22) & (np.abs(rest[:, 0]) < 0.12)
+    return float(rest[near, 2].max() - hips[2])
 
 
 def _thigh_front(rest: Float[np.ndarray, "V 3"], joints: Float[np.ndarray, "22 3"]) -> float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.motion.figure import Figure
+from experiments.motion.figure import SIDES, Figure
 from experiments.motion.score import Score
 
 
@@ -115,3 +115,104 @@ def sit_and_look(score: Score, seconds: float, side: float = 1.0) -> None:
     score.put("roll", (0.55 * t, 0.0), (0.70 * t, -1.6 * side), (t, -1.0 * side))
     score.put("left_wrist", (0.6 * t, 4.0), (0.75 * t, 10.0), (0.95 * t, 4.0))
     score.wait(seconds)
+
+
+def be_seated(score: Score, seat: Seat) -> None:
+    """Begin the score seated, hands on the thighs."""
+    depth, height = seated_hip(score.figure, seat)
+    score.start("hip", 0.0, depth + 0.02, height)
+    score.start("pitch", -seat.recline)
+    score.start("flex", seat.slump)
+    score.start("gaze", 8.0, 0.0)
+    for side in SIDES:
+        score.start(f"{side}_splay", 11.0)
+        score.start(f"{side}_ride", 1.0)
+        score.start(f"{side}_reach", 1.0)
+        score.start(f"{side}_swivel", 30.0)
+
+
+def lean_back(score: Score, seat: Seat, seconds: float, side: float = 1.0) -> None:
+    """On a sofa: sink into the back, one hand beside the thigh, look about at leisure."""
+    x, y, z = score.last("hip")
+    t = seconds
+    hand, sign = ("left", 1.0) if side > 0 else ("right", -1.0)
+    score.put("hip", (0.5, (x, y, z + 0.004)), (1.1, (x - 0.006 * sign, y + 0.02, z)))
+    score.put("pitch", (0.9, -seat.recline - 5.0), (0.6 * t, -seat.recline - 6.0))
+    score.put("flex", (1.0, seat.slump + 6.0), (0.6 * t, seat.slump + 8.0))
+    score.put("roll", (1.0, 1.5 * sign), (t, 1.0 * sign))
+    score.put("gaze", (0.7, (2.0, 12.0 * sign)), (0.30 * t, (5.0, 30.0 * sign)),
+              (0.52 * t, (6.0, 32.0 * sign)), (0.66 * t, (12.0, -4.0 * sign)),
+              (0.84 * t, (6.0, -22.0 * sign)), (t, (7.0, -16.0 * sign)))  # fmt: skip
+    score.put("gaze_roll", (0.35 * t, 4.0 * sign), (0.7 * t, -2.0 * sign))
+    score.put("twist", (0.34 * t, 6.0 * sign), (0.66 * t, -1.0 * sign), (0.9 * t, -4.0 * sign))
+    rest = (
+        x + (score.figure.hip_half_width + 0.25) * sign,
+        y - 0.06,
+        z - score.figure.seat_offset + 0.05,
+    )
+    score.start(f"{hand}_hand", *rest)
+    score.start(f"{hand}_palm_frame", 18.0 * sign, 0.0, 0.0)
+    score.put(f"{hand}_ride", (0.25, 1.0), (1.15, 0.0))
+    score.put(f"{hand}_palm", (0.4, 0.0), (1.1, 1.0))
+    score.put(f"{hand}_shrug", (0.7, 4.0), (1.3, 1.0))
+    score.both("splay", (0.6 * t, 13.0), (0.8 * t, 12.0), lag=0.2)
+    score.wait(seconds)
+
+
+def gather_hands(score: Score) -> None:
+    """Bring the hands back onto the thighs before standing up."""
+    for side in SIDES:
+        score.put(f"{side}_ride", (0.7, 1.0))
+        score.put(f"{side}_palm", (0.5, 0.0))
+    score.put("pitch", (0.7, -4.0))
+    score.put("flex", (0.7, 16.0))
+    score.put("gaze", (0.5, (12.0, 2.0)))
+    score.put("gaze_roll", (0.5, 0.0))
+    score.put("twist", (0.6, 0.0))
+    score.wait(0.7)
+
+
+def work_at_table(score: Score, height: float, seconds: float, rng: np.random.Generator) -> None:
+    """Seated: hands to a table top, type, look up to one side, type, sit back."""
+    x, y, _ = score.last("hip")
+    front, t = y - 0.41, seconds
+    score.put("gaze", (0.4, (30.0, 3.0)), (0.30 * t, (33.0, -4.0)), (0.36 * t, (8.0, 20.0)),
+              (0.48 * t, (6.0, 24.0)), (0.54 * t, (32.0, 2.0)), (0.76 * t, (34.0, -2.0)),
+              (0.84 * t, (4.0, -9.0)), (t, (8.0, -3.0)))  # fmt: skip
+    score.put("pitch", (0.8, 2.0), (0.76 * t, 3.0), (0.9 * t, -8.0))
+    score.put(
+        "flex", (0.8, 20.0), (0.4 * t, 17.0), (0.6 * t, 21.0), (0.76 * t, 22.0), (0.92 * t, 14.0)
+    )
+    score.put("twist", (0.34 * t, 0.0), (0.46 * t, 5.0), (0.58 * t, 0.0))
+    for sign, side in ((1.0, "left"), (-1.0, "right")):
+        lag = 0.12 if side == "left" else 0.0
+        place = np.array([0.11 * sign, front, height + 0.045])
+        lifted = place + np.array([0.04 * sign, 0.06, 0.05])
+        score.start(f"{side}_hand", *lifted)
+        score.start(f"{side}_palm_frame", 16.0 * -sign, 0.0, 0.0)
+        keys = [(0.75 + lag, tuple(lifted)), (1.1 + lag, tuple(place))]
+        score.put(f"{side}_hand", *keys, *_typing(1.3 + lag, 0.34 * t, place, rng),
+                  (0.38 * t + lag, tuple(place)), (0.5 * t + lag, tuple(place)),
+                  *_typing(0.55 * t + lag, 0.76 * t, place, rng),
+                  (0.8 * t + lag, tuple(lifted)))  # fmt: skip
+        score.put(
+            f"{side}_ride",
+            (0.1 + lag, 1.0),
+            (0.75 + lag, 0.0),
+            (0.79 * t + lag, 0.0),
+            (0.9 * t + lag, 1.0),
+        )
+        score.put(
+            f"{side}_palm", (0.5 + lag, 0.0), (1.0 + lag, 0.9), (0.8 * t, 0.9), (0.9 * t, 0.0)
+        )
+    score.wait(seconds)
+
+
+def _typing(
+    start: float, stop: float, place: np.ndarray, rng: np.random.Generator
+) -> list[tuple[float, tuple[float, ...]]]:
+    """Small hops of a hand over a keyboard, a key every fifth of a second or so."""
+    times = start + np.cumsum(rng.uniform(0.16, 0.30, 40))
+    hops = rng.normal(0.0, 1.0, (40, 3)) * np.array([0.010, 0.006, 0.0])
+    hops[:, 2] = np.where(np.arange(40) % 2 == 0, 0.010, 0.0)
+    return [(float(t), tuple(place + h)) for t, h in zip(times, hops, strict=True) if t < stop]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from experiments.motion.score import Score
 
 
@@ -33,9 +35,16 @@ def look_about(score: Score, seconds: float, side: float = 1.0) -> None:
 
 
 def reach_for(
-    score: Score, height: float, distance: float, hold: float, hand: str = "right"
+    score: Score,
+    height: float,
+    distance: float,
+    hold: float,
+    hand: str = "right",
+    tiptoe: float = 0.0,
 ) -> None:
     """Reach for something on a shelf at this height and distance (m) and come back; the feet stay.
+
+    `tiptoe` lifts both heels by that many degrees for a shelf that is high.
 
     Gaze first; trunk twist and shoulder carry the hand; the weight moves forward and the heel of the
     other side lifts; the other arm swings back.
@@ -46,12 +55,14 @@ def reach_for(
     goal = (0.13 * sign, y - distance, height)
     near = (0.20 * sign, y - 0.66 * distance, height - 0.12)
     up = max(0.0, height - 1.45)
+    # On the toes the ankles rise by the way from toe joint to ankle times the sine of the lift.
+    rise = float(np.sin(np.radians(tiptoe))) * float(np.linalg.norm(score.figure.ball[1:]))
     back = 1.15 + hold
     score.put("gaze", (0.30, (20.0 - 45.0 * (height - 1.1), 7.0 * sign)),
               (back + 0.1, (14.0 - 40.0 * (height - 1.1), 9.0 * sign)), (back + 0.7, (24.0, 10.0 * sign)),
               (back + 1.7, (6.0, 0.0)))  # fmt: skip
-    score.put("hip", (0.30, (x, y, z)), (1.05, (x - 0.012 * sign, y - 0.075, z - 0.006)),
-              (back, (x - 0.012 * sign, y - 0.078, z - 0.006)), (back + 1.1, (x, y, z)))  # fmt: skip
+    score.put("hip", (0.30, (x, y, z)), (1.05, (x - 0.012 * sign, y - 0.075, z - 0.006 + rise)),
+              (back, (x - 0.012 * sign, y - 0.078, z - 0.006 + rise)), (back + 1.1, (x, y, z)))  # fmt: skip
     score.put("twist", (0.25, 0.0), (1.05, -15.0 * sign), (back, -16.0 * sign), (back + 1.1, 1.5 * sign),
               (back + 1.6, 0.0))  # fmt: skip
     score.put("yaw", (0.3, 0.0), (1.1, -5.0 * sign), (back, -5.0 * sign), (back + 1.2, 0.0))
@@ -74,7 +85,11 @@ def reach_for(
     score.put(f"{other}_hang", (0.4, (9.0, 3.0, 17.0, 18.0)), (1.15, (13.0, -9.0, 22.0, 18.0)),
               (back + 0.2, (13.0, -8.0, 22.0, 18.0)), (back + 1.3, (8.5, 5.0, 16.0, 18.0)),
               (back + 1.8, (9.0, 3.0, 17.0, 18.0)))  # fmt: skip
-    score.put(f"{hand}_heel", (0.45, 0.0), (1.1, 9.0), (back, 9.0), (back + 0.8, 0.0))
+    score.put(
+        f"{hand}_heel", (0.45, 0.0), (1.1, 9.0 + tiptoe), (back, 9.0 + tiptoe), (back + 0.8, 0.0)
+    )
+    if tiptoe:
+        score.put(f"{other}_heel", (0.5, 0.0), (1.12, tiptoe), (back, tiptoe), (back + 0.85, 0.0))
     score.wait(back + 1.7)
 
 
@@ -111,3 +126,61 @@ def lean_on_table(score: Score, height: float, hold: float) -> None:
                   (back + 0.6 + lag, 0.0))  # fmt: skip
         score.put(f"{side}_swivel", (0.4, 24.0), (1.2, 40.0), (back, 40.0), (back + 1.0, 24.0))
     score.wait(back + 1.6)
+
+
+def pick_up(score: Score, height: float, hand: str = "right") -> None:
+    """Bend hips and knees, take something low in front, rise and look at it, let the arm sink."""
+    sign = 1.0 if hand == "left" else -1.0
+    other = "right" if hand == "left" else "left"
+    x, y, z = score.last("hip")
+    deep = min(1.0, max(0.2, (0.62 - height) / 0.45))
+    low = z - 0.16 - 0.14 * deep
+    goal = (0.07 * sign, y - 0.44, height)
+    near = (0.16 * sign, y - 0.40, height + 0.14)
+    held = (0.16 * sign, y - 0.36, z + 0.10)
+    score.put("gaze", (0.35, (42.0, 3.0 * sign)), (1.6, (52.0, 2.0 * sign)), (2.3, (44.0, 4.0 * sign)),
+              (3.0, (36.0, 8.0 * sign)), (4.2, (34.0, 7.0 * sign)), (5.0, (6.0, 0.0)))  # fmt: skip
+    score.put("hip", (0.3, (x, y + 0.01, z - 0.01)), (0.85, (x, y + 0.13, 0.45 * z + 0.55 * low)),
+              (1.45, (x - 0.015 * sign, y + 0.15, low)), (1.75, (x - 0.015 * sign, y + 0.15, low)),
+              (2.3, (x, y + 0.09, 0.5 * z + 0.5 * low)), (3.0, (x, y, z)))  # fmt: skip
+    score.put("pitch", (0.25, 3.0), (0.95, 30.0), (1.5, 44.0 + 8.0 * deep), (1.8, 44.0 + 8.0 * deep), (2.4, 26.0),
+              (3.1, 2.0))  # fmt: skip
+    score.put(
+        "flex",
+        (0.35, 6.0),
+        (1.0, 20.0),
+        (1.55, 33.0),
+        (1.85, 33.0),
+        (2.5, 17.0),
+        (3.2, 5.0),
+        (4.4, 4.0),
+    )
+    score.put("twist", (0.6, 0.0), (1.5, -9.0 * sign), (1.85, -8.0 * sign), (2.9, 0.0))
+    score.put("bend", (0.7, 0.0), (1.5, 3.0 * sign), (2.6, 0.0))
+    score.start(f"{hand}_hand", *near)
+    score.put(
+        f"{hand}_hand",
+        (1.1, near),
+        (1.5, goal),
+        (1.82, goal),
+        (2.25, near),
+        (2.95, held),
+        (4.0, held),
+    )
+    score.put(f"{hand}_reach", (0.55, 0.0), (1.25, 1.0), (4.0, 1.0), (4.9, 0.0))
+    score.put(
+        f"{hand}_pronation",
+        (0.7, 24.0),
+        (1.4, 50.0),
+        (1.9, 45.0),
+        (2.9, -20.0),
+        (4.0, -18.0),
+        (4.8, 24.0),
+    )
+    score.put(f"{hand}_wrist", (0.8, 0.0), (1.4, 14.0), (1.8, -6.0), (2.9, -8.0), (4.6, 4.0))
+    score.put(f"{hand}_protract", (0.8, 0.0), (1.5, 10.0), (2.6, 0.0))
+    score.put(f"{other}_hang", (0.7, (12.0, 8.0, 22.0, 20.0)), (1.5, (15.0, 16.0, 34.0, 26.0)),
+              (2.3, (11.0, 4.0, 22.0, 18.0)), (3.1, (8.5, 0.0, 14.0, 18.0)), (3.9, (9.0, 3.0, 17.0, 18.0)))  # fmt: skip
+    score.both("splay", (1.3, 13.0), (1.8, 13.0), (2.9, 3.0), lag=0.06)
+    score.both("heel", (0.9, 0.0), (1.5, 7.0 * deep), (1.8, 7.0 * deep), (2.5, 0.0), lag=0.05)
+    score.wait(5.1)

@@ -2,12 +2,42 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from experiments.motion.figure import Figure
-from experiments.motion.gait import MIRRORED_WALK, TURN_LEFT, TURN_RIGHT, WALK, gait, walk_within
+from experiments.motion.gait import (
+    MIRRORED_WALK,
+    STEP_LEFT,
+    TURN_LEFT,
+    TURN_RIGHT,
+    WALK,
+    gait,
+    walk_within,
+)
 from experiments.motion.motion import Motion
 from experiments.motion.perform import perform
-from experiments.motion.phrases_sit import CHAIR, sit_and_look, sit_down, stand_up
-from experiments.motion.phrases_stand import lean_on_table, look_about, reach_for, shift_weight
+from experiments.motion.phrases_lie import get_up, lie_down, rest
+from experiments.motion.phrases_sit import (
+    BED,
+    CHAIR,
+    SOFA,
+    be_seated,
+    gather_hands,
+    lean_back,
+    sit_and_look,
+    sit_down,
+    stand_up,
+    work_at_table,
+)
+from experiments.motion.phrases_stand import (
+    lean_on_table,
+    look_about,
+    pick_up,
+    reach_for,
+    shift_weight,
+)
+from experiments.motion.phrases_step import step, turn_to
+from experiments.motion.resample import window
 from experiments.motion.score import Score
 
 
@@ -44,6 +74,92 @@ def sit_stay_stand(figure: Figure) -> Motion:
     stand_up(score)
     score.wait(0.6)
     return perform(score, "", 21)
+
+
+def sofa_sit(figure: Figure) -> Motion:
+    """Sit down on a sofa, lean back, look about, stand up."""
+    score = Score(figure)
+    score.wait(0.5)
+    sit_down(score, SOFA)
+    lean_back(score, SOFA, 4.6)
+    gather_hands(score)
+    stand_up(score)
+    score.wait(0.5)
+    return perform(score, "", 22)
+
+
+def sit_work(figure: Figure) -> Motion:
+    """Sit at a table, type, look up, sit back."""
+    score = Score(figure)
+    be_seated(score, CHAIR)
+    score.wait(0.4)
+    work_at_table(score, 0.73, 8.2, np.random.default_rng(23))
+    score.wait(0.6)
+    return perform(score, "", 23)
+
+
+def lie_down_on_bed(figure: Figure) -> Motion:
+    """Sit down on the edge of a bed, lie down, rest."""
+    score = Score(figure)
+    score.wait(0.4)
+    sit_down(score, BED)
+    lie_down(score, BED)
+    rest(score, 3.0)
+    return perform(score, "", 24)
+
+
+def rest_and_get_up(figure: Figure) -> Motion:
+    """Rest on a bed, get up to its edge, stand up."""
+    score = Score(figure)
+    sit_down(score, BED)
+    lie_down(score, BED)
+    start = score.beat + 0.4
+    rest(score, 2.4)
+    get_up(score, BED)
+    sit_and_look(score, 1.4, -1.0)
+    stand_up(score)
+    score.wait(0.5)
+    whole = perform(score, "", 25)
+    return window(whole, round(start * whole.fps), whole.n_frames)
+
+
+def bend_pick(figure: Figure) -> Motion:
+    """Pick something up from low down, look at it."""
+    score = Score(figure)
+    score.wait(0.5)
+    pick_up(score, 0.22)
+    score.wait(0.5)
+    return perform(score, "", 34)
+
+
+def reach_high(figure: Figure) -> Motion:
+    """Reach for a high shelf on tiptoe."""
+    score = Score(figure)
+    score.wait(0.6)
+    reach_for(score, 1.08 * figure.hip_height + 0.78, 0.46, 1.0, "left", tiptoe=16.0)
+    score.wait(0.7)
+    return perform(score, "", 35)
+
+
+def step_aside(figure: Figure) -> Motion:
+    """Two steps to the left to make way, look at who passes, two steps back."""
+    score = Score(figure)
+    score.wait(0.4)
+    score.put("gaze", (0.4, (6.0, -24.0)), (1.2, (8.0, -20.0)))
+    step(score, "left", (0.46, 0.05), 14.0)
+    step(score, "right", (0.25, 0.05), -4.0)
+    look_about(score, 2.6, -1.0)
+    turn_to(score, 0.0, 0.8)
+    step(score, "right", (-0.14, 0.0), -8.0)
+    step(score, "left", (0.07, 0.01), 9.0)
+    score.wait(0.8)
+    return perform(score, "", 36)
+
+
+def walk_around(figure: Figure) -> Motion:
+    """Walk up to something, round it to the right, and on."""
+    clips = (*WALK, TURN_RIGHT, STEP_LEFT, TURN_LEFT, *MIRRORED_WALK)
+    return _walk_and_stop(figure, clips, 15)
 
 
 def reach_forward(figure: Figure) -> Motion:
