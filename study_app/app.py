@@ -35,7 +35,7 @@ def create_app(settings: Settings, database: Database | None = None) -> Flask:
         MAX_CONTENT_LENGTH=MAX_BODY,
         MAX_FORM_MEMORY_SIZE=MAX_BODY,
         PERMANENT_SESSION_LIFETIME=timedelta(days=60),
-        SESSION_COOKIE_NAME="pace",
+        SESSION_COOKIE_NAME="study",
         SESSION_COOKIE_HTTPONLY=True,
         SESSION_COOKIE_SAMESITE="Lax",
         SESSION_COOKIE_SECURE=settings.secure_cookies,

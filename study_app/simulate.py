@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 from random import Random
@@ -184,14 +184,18 @@ def _call(person: Simulated, method: str, url: str, **options: Any) -> requests.
 
 
 def _read(reply: requests.Response) -> Page:
+    return parse_page(reply.url, reply.text)
+
+
+def parse_page(url: str, text: str) -> Page:
+    """What a page offers: its first form with hidden fields, the data of <main>, the CSRF token."""
     reader = _PageReader()
-    reader.feed(reply.text)
+    reader.feed(text)
     fields = dict(reader.fields)
-    if reader.radios:
-        name = next(iter(reader.radios))
-        fields[name] = "right" if "right" in reader.radios[name] else reader.radios[name][0]
-    action = urljoin(reply.url, reader.action) if reader.action else None
-    return Page(reply.url, reader.main, action, fields, reader.csrf, reader.finished)
+    for name, values in reader.radios.items():
+        fields[name] = "right" if "right" in values else values[0]
+    action = urljoin(url, reader.action) if reader.action else None
+    return Page(url, reader.main, action, fields, reader.csrf, reader.finished)
 
 
 class _PageReader(HTMLParser):
@@ -230,10 +234,3 @@ class _PageReader(HTMLParser):
             self.radios.setdefault(values["name"], []).append(values["value"])
         elif "name" in values:
             self.fields[values["name"]] = values.get("value", "")
-
-
-def methods_of_groups(
-    groups: dict[str, float], methods: Iterator[tuple[str, str]]
-) -> dict[str, float]:
-    """Worth by method name, for who holds the database: `methods` gives (group, method)."""
-    return {method: groups[group] for group, method in methods if group in groups}

@@ -53,10 +53,9 @@ def plan_study(config: StudyConfig, folder: Path, source: object) -> StudyPlan:
     _check_names(config, catalogue, source)
     faults = verify_catalogue(folder)
     if faults:
-        more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-        raise InputError(
-            folder / FILE_NAME, "clips", faults[0] + more, "clips as they were rendered"
-        )
+        file, clip, fault = faults[0].split(": ", 2)
+        others = f" ({len(faults)} clips are at fault)" if len(faults) > 1 else ""
+        raise InputError(file, clip, fault, "the file as it was rendered" + others)
     scenes = config.scenes or tuple(
         sorted({clip.scene for clip in _study_clips(config, catalogue)})
     )

@@ -48,6 +48,7 @@ export class Outbox {
     const batch = this.waiting.slice(0, BATCH);
     try {
       const reply = await this.post(this.options.events, { events: batch });
+      await reply.text(); // an unread reply would be cut off when the page is left
       if (reply.status >= 500) throw new Error("server is away");
       this.waiting.splice(0, batch.length);
     } catch {

@@ -197,8 +197,8 @@ function keyAction(key) {
 
 function rememberKeySwitch() {
   const keySwitch = /** @type {HTMLInputElement} */ (byId("keys"));
-  keySwitch.checked = localStorage.getItem("pace-keys") !== "off";
-  keySwitch.addEventListener("change", () => localStorage.setItem("pace-keys", keySwitch.checked ? "on" : "off"));
+  keySwitch.checked = localStorage.getItem("study-keys") !== "off";
+  keySwitch.addEventListener("change", () => localStorage.setItem("study-keys", keySwitch.checked ? "on" : "off"));
 }
 
 let preloading = false;

@@ -1,31 +1,37 @@
-"""A small real stimulus set (clips that play), databases of both kinds, and a running server."""
+"""A small stimulus set, databases of both kinds, the app with a clock wound by hand, a real server."""
 
 from __future__ import annotations
 
+import importlib.util
 import itertools
+import json
 import os
 import shutil
 import socket
-import struct
 import subprocess
 import sys
 import tempfile
 import time
+import uuid
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import pytest
+from flask import Flask
+from werkzeug.test import TestResponse
 
-from renderer.catalogue import Catalogue, Clip, write_catalogue
-from renderer.files import file_sha256
+from study_app.app import create_app
+from study_app.config import read_study
 from study_app.db import Database, upgrade
+from study_app.settings import Settings
+from study_app.simulate import Page, parse_page
+from study_app.stimuli import plan_study
+from study_app.studies import create_study, open_study
 
 ROOT = Path(__file__).resolve().parents[2]
-METHODS = ("pace", "paak", "posa_t")
-SCENES = ("bedroom", "library")
-MOTIONS = tuple(f"walk_{n}" for n in range(6))
-
 STUDY = """
 study_id = "tiny"
 title = "Human motion in rooms"
@@ -37,84 +43,20 @@ seed = 3
 """
 
 
-def encode_clip(path: Path, source: str, seconds: float) -> None:
-    """A real H.264 clip of a test picture."""
-    import imageio_ffmpeg
-
-    command = [
-        imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-y", "-f", "lavfi",
-        "-i", f"{source}=size=320x180:rate=20", "-t", str(seconds),
-        "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(path),
-    ]  # fmt: skip
-    subprocess.run(command, check=True)
-
-
-def tiny_png() -> bytes:
-    """A grey picture of 16 x 9 pixels."""
-    import zlib
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        body = kind + data
-        return struct.pack(">I", len(data)) + body + struct.pack(">I", zlib.crc32(body))
-
-    rows = zlib.compress(b"".join(b"\0" + b"\x80" * 16 for _ in range(9)))
-    header = struct.pack(">IIBBBBB", 16, 9, 8, 0, 0, 0, 0)
-    return (
-        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
-    )
-
-
-def write_stimuli(folder: Path, masters: list[Path], seconds: float = 1.0) -> Path:
-    """A catalogue with every method in every scene and motion, two catch and two practice pairs."""
-    (folder / "clips").mkdir(parents=True)
-    (folder / "poster.png").write_bytes(tiny_png())
-    wanted = [("main", s, m, x) for s in SCENES for m in MOTIONS for x in METHODS]
-    wanted += [("catch", s, "walk_0", x) for s in SCENES for x in ("pace", "lifted")]
-    wanted += [("practice", s, "sit_0", x) for s in SCENES for x in ("posa_t", "lifted")]
-    clips = [
-        _clip(folder, masters[number % len(masters)], number, row, seconds)
-        for number, row in enumerate(wanted)
-    ]
-    named = tuple({"name": name} for name in METHODS)
-    scenes = tuple({"scene": name} for name in SCENES)
-    motions = tuple({"motion": name} for name in MOTIONS)
-    catalogue = Catalogue(
-        "tiny", "2026-01-01T00:00:00Z", {"seed": 0}, scenes, motions, named, (), tuple(clips)
-    )
-    write_catalogue(catalogue, folder)
-    return folder
-
-
-def _clip(folder: Path, master: Path, number: int, row: tuple[str, ...], seconds: float) -> Clip:
-    """The master clip, made unique by an empty box at its end, which players pass over."""
-    role, scene, motion, method = row
-    file = f"clips/{number:04d}.mp4"
-    unique = struct.pack(">I4sQ", 16, b"free", number)
-    (folder / file).write_bytes(master.read_bytes() + unique)
-    digest = file_sha256(folder / file)
-    return Clip(
-        clip_id=digest[:16], file=file, sha256=digest, frames_sha256=digest, poster="poster.png",
-        role=role, method=method, scene=scene, motion=motion, views=("front",), tiling="grid",
-        fps=20.0, n_frames=round(20 * seconds), duration_s=seconds, width=320, height=180,
-        codec="h264", scores={}, placement="",
-    )  # type: ignore[arg-type]  # fmt: skip
-
-
-@pytest.fixture(scope="session")
-def stimuli(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("stimuli")
-    masters = [folder / "a.mp4", folder / "b.mp4"]
-    for master, source in zip(masters, ("testsrc2", "mandelbrot"), strict=True):
-        encode_clip(master, source, 1.0)
-    return write_stimuli(folder / "set", masters)
+def _helper(name: str) -> Any:
+    """A helper module beside this file (test folders are no packages)."""
+    path = Path(__file__).with_name(f"{name}.py")
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.fixture(scope="session")
 def still_stimuli(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same catalogue over files that no player needs to open: quick to make, for logic tests."""
     folder = tmp_path_factory.mktemp("still")
-    (folder / "m.mp4").write_bytes(bytes(range(256)) * 8)
-    return write_stimuli(folder / "set", [folder / "m.mp4"])
+    return Path(_helper("stimulus_set").write_still_stimuli(folder))
 
 
 def _postgresql_bin() -> Path:
@@ -192,12 +134,16 @@ def sqlite_url(tmp_path: Path) -> str:
 
 
 @pytest.fixture
-def study_file(tmp_path: Path) -> Callable[[str], Path]:
-    """Writes a study file: the usual one with some lines added."""
+def study_file(tmp_path: Path) -> Callable[..., Path]:
+    """Writes a study file: the usual one with lines added and words replaced."""
 
-    def write(extra: str = "", base: str = STUDY) -> Path:
+    def write(extra: str = "", *replacements: tuple[str, str]) -> Path:
+        text = STUDY
+        for old, new in replacements:
+            assert old in text
+            text = text.replace(old, new)
         path = tmp_path / "study.toml"
-        path.write_text(base + extra, encoding="utf-8")
+        path.write_text(text + extra, encoding="utf-8")
         return path
 
     return write
@@ -217,8 +163,6 @@ def pace() -> Callable[..., subprocess.CompletedProcess[str]]:
 @pytest.fixture
 def serve() -> Iterator[Callable[[str], str]]:
     """Starts the real server over a database; gives its address when it is ready."""
-    import json
-
     processes: list[subprocess.Popen[str]] = []
 
     def start(url: str, **environment: str) -> str:
@@ -247,3 +191,119 @@ def wait_until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
     while not condition():
         assert time.monotonic() < deadline, "condition was not met in time"
         time.sleep(0.02)
+
+
+class Clock:
+    """The server's clock, wound by hand."""
+
+    def __init__(self) -> None:
+        self.time = datetime(2026, 3, 1, 12, tzinfo=UTC)
+
+    def __call__(self) -> datetime:
+        return self.time
+
+    def forward(self, seconds: float) -> None:
+        self.time += timedelta(seconds=seconds)
+
+
+class Visitor:
+    """A participant's browser without a screen: follows pages, sends what the page's script sends."""
+
+    def __init__(self, app: Flask, start: str = "/s/tiny") -> None:
+        self.client = app.test_client()
+        self.received: list[TestResponse] = []
+        self.page = self.get(start)
+
+    def fetch(self, url: str, **headers: str) -> TestResponse:
+        """One request, read to its end; redirects are not followed."""
+        reply = self.client.get(url, headers=headers, buffered=True)
+        self.received.append(reply)
+        return reply
+
+    def get(self, url: str) -> Page:
+        return self._keep(self.client.get(url, follow_redirects=True))
+
+    def post(self, url: str, data: dict[str, str]) -> Page:
+        return self._keep(self.client.post(url, data=data, follow_redirects=True))
+
+    def _keep(self, reply: TestResponse) -> Page:
+        self.received += [*reply.history, reply]
+        self.page = parse_page(reply.request.url, reply.text)
+        return self.page
+
+    @property
+    def reply(self) -> TestResponse:
+        return self.received[-1]
+
+    def go_to_trial(self) -> Page:
+        while self.page.main.get("data-page") != "trial" and not self.page.finished:
+            assert self.page.action, self.reply.text
+            self.post(self.page.action, self.page.fields)
+        return self.page
+
+    def call(self, name: str, body: dict[str, Any] | bytes, **headers: str) -> TestResponse:
+        url = self.page.main["data-answer-url"].removesuffix("answer") + name
+        data = body if isinstance(body, bytes) else json.dumps(body).encode()
+        headers = {"X-CSRFToken": self.page.csrf} | headers
+        reply = self.client.post(url, data=data, headers=headers)
+        self.received.append(reply)
+        return reply
+
+    def answer(self, chosen: str = "first", **changes: Any) -> TestResponse:
+        body = {
+            "answer_id": str(uuid.uuid4()), "chosen": chosen, "response_time_ms": 9000,
+            "decision_time_ms": 1500, "plays_first": 1, "plays_second": 2, "layout": "side_by_side",
+        }  # fmt: skip
+        return self.call("answer", body | changes)
+
+    def answer_all(self) -> Page:
+        while "data-answer-url" in self.go_to_trial().main:
+            assert self.answer().status_code == 200
+            self.get("/s/tiny/session")
+        return self.page
+
+
+@dataclass
+class Site:
+    """The app over one study, with its clock and a way to let visitors in."""
+
+    app: Flask
+    database: Database
+    clock: Clock
+    stimuli: Path
+
+    def visitor(self, start: str = "/s/tiny") -> Visitor:
+        return Visitor(self.app, start)
+
+    def do(self, work: Callable[..., Any], *words: Any) -> Any:
+        """Operator's work: `work(session, *words)`."""
+        return self.database.retry(lambda session: work(session, *words))
+
+
+@pytest.fixture
+def new_site(study_file: Callable[..., Path], still_stimuli: Path) -> Iterator[Callable[..., Site]]:
+    """Makes an app over a fresh open study: `new_site(url, extra lines, settings...)`."""
+    made: list[Database] = []
+
+    def make(url: str, extra: str = "", *words: tuple[str, str], opened: bool = True,
+             **settings: Any) -> Site:  # fmt: skip
+        database, clock = Database(url), Clock()
+        made.append(database)
+        upgrade(database)
+        path = study_file(extra, *words)
+        plan = plan_study(read_study(path), still_stimuli, path)
+        database.retry(lambda session: create_study(session, plan, clock()))
+        if opened:
+            database.retry(lambda session: open_study(session, "tiny", "live", clock()))
+        app = create_app(Settings(database_url=url, **settings), database)
+        app.extensions["pace"].now = clock
+        return Site(app, database, clock, still_stimuli)
+
+    yield make
+    for database in made:
+        database.close()
+
+
+@pytest.fixture
+def site(new_site: Callable[..., Site], sqlite_url: str) -> Site:
+    return new_site(sqlite_url)

@@ -1,0 +1,302 @@
+"""Whole sessions in a real browser, with clips that really play, over the real server."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+
+ROOT = Path(__file__).resolve().parents[2]
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+STUDY = """
+study_id = "tiny"
+title = "Human motion in rooms"
+question = "In which clip does the person look more realistic?"
+target = "pace"
+baselines = ["paak"]
+trials_per_cell = 2
+seed = 3
+[extra_trials]
+practice = 1
+catch = 1
+[checks]
+break_every = 3
+"""
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)
+        yield browser
+        browser.close()
+
+
+def pace(*words: object) -> str:
+    command = [sys.executable, "-m", "pace_study", *map(str, words)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+class Study:
+    """A study under way: its database, its address, its answers."""
+
+    def __init__(self, folder: Path, stimuli: Path) -> None:
+        self.folder = folder
+        self.where = ("--database", f"sqlite:///{folder}/study.sqlite")
+        (folder / "study.toml").write_text(STUDY)
+        pace("study", "create", folder / "study.toml", "--catalogue", stimuli, *self.where)
+        pace("study", "open", "tiny", *self.where)
+        words = ["-m", "pace_study", "serve", "--port", "0", "--json", *self.where]
+        self.server = subprocess.Popen(
+            [sys.executable, *words], cwd=ROOT, stdout=subprocess.PIPE, text=True, env=os.environ
+        )
+        assert self.server.stdout is not None
+        self.url = json.loads(self.server.stdout.readline())["url"] + "/s/tiny"
+
+    def answers(self) -> list[dict[str, str]]:
+        pace("study", "export", "tiny", "--out", self.folder / "out", *self.where)
+        with (self.folder / "out" / "responses.csv").open(newline="") as stream:
+            return list(csv.DictReader(stream))
+
+    def stop(self) -> None:
+        self.server.terminate()
+        self.server.wait(20)
+        assert self.server.stdout is not None
+        self.server.stdout.close()
+
+
+@pytest.fixture
+def study(tmp_path: Path, playing_stimuli: Path) -> Iterator[Study]:
+    running = Study(tmp_path, playing_stimuli)
+    yield running
+    assert json.loads(pace("study", "doctor", "tiny", "--json", *running.where))["findings"] == []
+    running.stop()
+
+
+@pytest.fixture
+def visit(chromium: Browser) -> Iterator[Callable[..., Page]]:
+    """Opens a page in a fresh browser profile; any script error fails the test."""
+    contexts: list[BrowserContext] = []
+    faults: list[str] = []
+
+    def open_page(url: str, **options: Any) -> Page:
+        context = chromium.new_context(**options)
+        context.set_default_timeout(30_000)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.goto(url)
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert faults == []
+
+
+def begin(page: Page) -> None:
+    page.get_by_test_id("consent-agree").click()
+    page.get_by_test_id("begin").click()
+    page.get_by_test_id("play-both").wait_for()
+
+
+def trial_of(page: Page) -> str | None:
+    return page.locator("#trial").get_attribute("data-trial")
+
+
+def leave(page: Page, trial: str | None) -> None:
+    """Wait until the next page has come."""
+    page.wait_for_function(
+        "old => { const t = document.querySelector('#trial'); return !t || t.dataset.trial !== old; }",
+        arg=trial,
+    )
+
+
+def choose(page: Page, position: str = "first") -> None:
+    """Play both clips, choose, confirm."""
+    trial = trial_of(page)
+    page.get_by_test_id("play-both").click()
+    page.get_by_test_id(f"choose-{position}").click()
+    page.get_by_test_id("confirm").click()
+    leave(page, trial)
+
+
+def test_a_participant_plays_and_answers_a_whole_session(
+    study: Study, visit: Callable[..., Page]
+) -> None:
+    page = visit(study.url, viewport={"width": 1366, "height": 700})
+    begin(page)
+    for _ in range(6):
+        expect(page.get_by_test_id("progress")).to_be_visible()
+        choose(page)
+    expect(page.get_by_test_id("completion-code")).to_have_text(
+        r := page.get_by_test_id("completion-code").inner_text()
+    )
+    assert len(r) == 8
+    rows = study.answers()
+    assert [row["trial_kind"] for row in rows].count("main") == 4 and len(rows) == 6
+    assert {(row["viewed_first"], row["viewed_second"]) for row in rows} == {("proven", "proven")}
+    assert {(row["layout"], row["plays_first"], row["late"]) for row in rows} == {
+        ("side_by_side", "1", "false")
+    }
+    assert all(int(row["response_time_ms"]) >= 900 for row in rows)
+
+
+def test_choosing_opens_only_after_both_clips_were_played_to_the_end(
+    study: Study, visit: Callable[..., Page]
+) -> None:
+    page = visit(study.url)
+    begin(page)
+    expect(page.get_by_test_id("choose-first")).to_be_disabled()
+    page.get_by_test_id("play-first").click()
+    expect(page.locator("#seen-first")).to_have_text("✓")
+    expect(page.get_by_test_id("choose-first")).to_be_disabled()
+    # Seeking to the end fires `ended` at once; it must not count as seen.
+    page.evaluate(
+        "() => { const v = document.querySelector('#video-second'); v.currentTime = v.duration; return v.play(); }"
+    )
+    page.wait_for_function("() => document.querySelector('#video-second').ended")
+    expect(page.get_by_test_id("choose-first")).to_be_disabled()
+    page.get_by_test_id("play-second").click()
+    expect(page.get_by_test_id("choose-first")).to_be_enabled()
+    expect(page.get_by_test_id("confirm")).to_be_disabled()
+
+
+def test_fast_playback_is_not_watching(study: Study, visit: Callable[..., Page]) -> None:
+    page = visit(study.url)
+    begin(page)
+    page.evaluate(
+        "() => document.querySelectorAll('video').forEach(v =>"
+        " v.addEventListener('playing', () => { v.playbackRate = 4; }))"
+    )
+    page.get_by_test_id("play-both").click()
+    page.wait_for_function("() => [...document.querySelectorAll('video')].every(v => v.ended)")
+    expect(page.get_by_test_id("choose-first")).to_be_disabled()
+
+
+def test_the_keys_do_everything_and_can_be_switched_off(
+    study: Study, visit: Callable[..., Page]
+) -> None:
+    page = visit(study.url)
+    begin(page)
+    trial = trial_of(page)
+    page.keyboard.press("Space")
+    expect(page.get_by_test_id("choose-second")).to_be_enabled()
+    page.keyboard.press("2")
+    expect(page.get_by_test_id("choose-second")).to_be_checked()
+    page.keyboard.press("1")
+    page.keyboard.press("Enter")
+    leave(page, trial)
+    page.get_by_label("Keyboard shortcuts").uncheck()
+    page.keyboard.press("Space")
+    page.wait_for_timeout(300)
+    assert page.evaluate("() => document.querySelector('#video-first').paused")
+    page.reload()
+    expect(page.get_by_label("Keyboard shortcuts")).not_to_be_checked()
+    assert [row["chosen_position"] for row in study.answers()] == ["first"]
+
+
+def test_a_reload_in_mid_trial_and_a_second_tab_stay_on_the_same_trial(
+    study: Study, visit: Callable[..., Page]
+) -> None:
+    page = visit(study.url)
+    begin(page)
+    trial = trial_of(page)
+    page.get_by_test_id("play-both").click()
+    page.wait_for_timeout(300)
+    page.reload()
+    assert trial_of(page) == trial
+    other = page.context.new_page()
+    other.goto(study.url)
+    assert trial_of(other) == trial
+    choose(page, "first")
+    other.get_by_test_id("play-both").click()
+    other.get_by_test_id("choose-second").click()
+    other.get_by_test_id("confirm").click()
+    leave(other, trial)
+    assert trial_of(other) == trial_of(page)
+    assert [row["chosen_position"] for row in study.answers()] == ["first"]
+
+
+def test_an_answer_survives_a_line_that_is_down_and_a_reload(
+    study: Study, visit: Callable[..., Page]
+) -> None:
+    page = visit(study.url)
+    begin(page)
+    trial = trial_of(page)
+    page.get_by_test_id("play-both").click()
+    page.get_by_test_id("choose-second").click()
+    page.context.set_offline(True)
+    page.get_by_test_id("confirm").click()
+    expect(page.locator("#status")).to_contain_text("No connection")
+    page.context.set_offline(False)
+    leave(page, trial)
+    assert [row["chosen_position"] for row in study.answers()] == ["second"]
+
+
+def test_a_clip_that_cannot_be_had_is_told_and_may_be_skipped_after_a_second_try(
+    study: Study, visit: Callable[..., Page]
+) -> None:
+    page = visit(study.url)
+    page.get_by_test_id("consent-agree").click()
+    page.route("**/m/*", lambda route: route.fulfill(status=404))
+    page.get_by_test_id("begin").click()
+    trial = trial_of(page)
+    expect(page.locator("#status")).to_have_text("A clip could not be loaded.")
+    expect(page.locator("#skip")).to_be_hidden()
+    page.locator("#retry").click()
+    page.locator("#skip").click()
+    leave(page, trial)
+    assert study.answers() == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_every_page_is_accessible_on_a_narrow_phone(
+    study: Study, visit: Callable[..., Page], scheme: str
+) -> None:
+    from axe_playwright_python.sync_playwright import Axe
+
+    page = visit(study.url, viewport={"width": 320, "height": 640}, color_scheme=scheme)
+    checked = []
+
+    def check(name: str) -> None:
+        found = Axe().run(page).response["violations"]
+        assert [(name, fault["id"], fault["nodes"][0]["html"]) for fault in found] == []
+        width = page.evaluate("() => document.documentElement.scrollWidth")
+        assert width <= 320, f"{name} is {width} px wide"
+        checked.append(name)
+
+    check("consent")
+    page.get_by_test_id("consent-agree").click()
+    check("instructions")
+    page.get_by_test_id("begin").click()
+    page.get_by_test_id("play-both").wait_for()
+    check("trial")
+    for _ in range(6):
+        choose(page)
+        if page.get_by_test_id("practice-feedback").count() or page.locator("#pause").count():
+            check("trial with a notice")
+    check("done")
+    page.goto(study.url + "/withdraw")
+    check("withdraw")
+    page.goto(study.url + "/none")
+    check("error")
+    assert len(checked) == 8
