@@ -49,6 +49,8 @@ class BodyModel(Protocol):
     regions: dict[str, Integer[np.ndarray, " R"]]
     """Named index lists in full numbering: left_sole, right_sole, buttocks, thigh_backs, back,
     left_palm, right_palm, left_hand, right_hand, forearms, calves."""
+    contact_rows: Integer[np.ndarray, " C"]
+    """Vertices beside `subset` that thicken its thin contact areas (soles, buttocks, thighs, back)."""
     rest_joints: Float[np.ndarray, "22 3"]
     """Joint positions of the zero pose, SMPL-X axes (y up, facing +z), metres."""
 
