@@ -45,11 +45,11 @@ def main(update: bool) -> None:
     """Compare the embedded bodies with the package anny."""
     try:
         report = check_report()
-        _check_bounds(report)
+        check_bounds(report)
         if update:
             write_json(CHECK_FILE, report)
         else:
-            _check_figures(report, read_json(CHECK_FILE))
+            check_figures(report, read_json(CHECK_FILE))
     except InputError as error:
         raise click.ClickException(str(error)) from None
     for name, figures in report["figures"].items():
@@ -177,7 +177,8 @@ def _samples(
     }
 
 
-def _check_bounds(report: dict[str, Any]) -> None:
+def check_bounds(report: dict[str, Any]) -> None:
+    """Raise `InputError` for the first error beyond its bound."""
     for name, figures in report["figures"].items():
         for key, bound in (
             ("full_max_m", FULL_BOUND_M),
@@ -189,7 +190,8 @@ def _check_bounds(report: dict[str, Any]) -> None:
                 raise InputError(name, key, figures[key], f"less than {bound} m")
 
 
-def _check_figures(report: dict[str, Any], stored: dict[str, Any]) -> None:
+def check_figures(report: dict[str, Any], stored: dict[str, Any]) -> None:
+    """Raise `InputError` for the first figure that differs from the stored one by over 5 %."""
     if stored["anny_version"] != report["anny_version"]:
         raise InputError(CHECK_FILE, "anny_version", report["anny_version"], stored["anny_version"])
     for name, figures in report["figures"].items():
