@@ -43,8 +43,8 @@ LIBRARY = Path("/usr/share/sweethome3d/furniture/BlendSwap-CC-0.sh3f")
 _RETRIES = (1.0, 1.5, 2.2, 3.5, 6.0)
 _TEXTURE_SIDE = 256
 _SHARD_BYTES = 3_400_000
-_LIFT, _SATURATION, _BRIGHTEST = 0.8, 0.72, 0.84
-"""The library's diffuse colours are too dark and too loud for a light, calm room."""
+_DARKEST, _BRIGHTEST = 0.03, 0.95
+"""Range of the colours kept: on pure black no shadow shows, on pure white no light."""
 
 
 @dataclass(frozen=True)
@@ -210,13 +210,12 @@ def _drop(corners: Float[np.ndarray, "F 3 3"]) -> float:
 
 
 def _finish(before: SourcePart, after: np.ndarray, spec: dict[str, Any]) -> PackedPart:
-    """Texture coordinates from the closest point of the original; colours toned."""
+    """Texture coordinates from the closest point of the original; or the colour of the list."""
     colour = spec.get("colours", {}).get(before.material)
     if before.texture is None or before.uv is None or colour is not None:
-        red, green, blue = toned(np.array(colour or before.colour), lift=colour is None)
+        red, green, blue = np.clip(colour or before.colour, _DARKEST, _BRIGHTEST).tolist()
         return PackedPart((red, green, blue), after, None, None)
-    texture = _shrunk(before.texture)
-    return PackedPart((1.0, 1.0, 1.0), after, _carried_uv(before, after), texture)
+    return PackedPart((1.0, 1.0, 1.0), after, _carried_uv(before, after), _shrunk(before.texture))
 
 
 def _carried_uv(
@@ -227,7 +226,7 @@ def _carried_uv(
     pulled = (0.97 * after + 0.03 * after.mean(1, keepdims=True)).reshape(-1, 3)
     face, _, foot = closest(pulled, before.corners)
     weights = _barycentric(before.corners[face], foot)
-    return np.einsum("nk,nkc->nc", weights, before.uv[face]).reshape(-1, 3, 2)
+    return np.asarray(np.einsum("nk,nkc->nc", weights, before.uv[face]).reshape(-1, 3, 2))
 
 
 def _barycentric(
@@ -239,21 +238,11 @@ def _barycentric(
     t1, t2 = (to * e1).sum(1), (to * e2).sum(1)
     det = np.maximum(d11 * d22 - d12 * d12, 1e-24)
     v, w = (d22 * t1 - d12 * t2) / det, (d11 * t2 - d12 * t1) / det
-    return np.clip(np.stack([1 - v - w, v, w], 1), 0.0, 1.0)
-
-
-def toned(colours: Float[np.ndarray, "... 3"], lift: bool) -> Float[np.ndarray, "... 3"]:
-    """Lift dark colours, take back saturation, and keep clear of white."""
-    lifted = colours**_LIFT if lift else colours
-    grey = lifted @ np.array([0.2126, 0.7152, 0.0722])
-    saturation = _SATURATION if lift else 1.0
-    calm = grey[..., None] + saturation * (lifted - grey[..., None])
-    return np.clip(calm, 0.02, _BRIGHTEST)
+    return np.asarray(np.clip(np.stack([1 - v - w, v, w], 1), 0.0, 1.0))
 
 
 def _shrunk(texture: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h2 w2 3"]:
-    calm = toned(texture.astype(float) / 255.0, lift=True)
-    image = Image.fromarray(np.round(255 * calm).astype(np.uint8))
+    image = Image.fromarray(texture)
     image.thumbnail((_TEXTURE_SIDE, _TEXTURE_SIDE), Image.Resampling.LANCZOS)
     return np.asarray(image)
 
@@ -319,7 +308,7 @@ def _solid(part: PackedPart) -> np.ndarray:
     key = np.round(part.corners / 1e-5).astype(np.int64)
     a, b, c = key[:, 0], key[:, 1], key[:, 2]
     same = np.all(a == b, 1) | np.all(b == c, 1) | np.all(a == c, 1)
-    return ~same
+    return np.asarray(~same)
 
 
 def _faces_of(
@@ -332,7 +321,8 @@ def _faces_of(
 
 
 def _keys(points: Float[np.ndarray, "N 3"]) -> list[list[int]]:
-    return np.round(points / 1e-5).astype(np.int64).tolist()
+    keys: list[list[int]] = np.round(points / 1e-5).astype(np.int64).tolist()
+    return keys
 
 
 def _png(texture: UInt8[np.ndarray, "h w 3"]) -> np.ndarray:

@@ -31,7 +31,7 @@ class Welded:
 
     def corners(self) -> Float[np.ndarray, "F 3 3"]:
         """The same mesh as a triangle soup."""
-        return self.vertices[self.faces]
+        return np.asarray(self.vertices[self.faces])
 
 
 def weld(corners: Float[np.ndarray, "F 3 3"]) -> Welded:
@@ -87,7 +87,7 @@ def thin_leaves(
     centres /= np.maximum(np.bincount(owner, minlength=n_leaves), 1)[:, None]
     grown = centres[owner][:, None] + growth * (soup - centres[owner][:, None])
     grown[..., 2] = np.maximum(grown[..., 2], 0.0)
-    return grown
+    return np.asarray(grown)
 
 
 def without_crumbs(corners: Float[np.ndarray, "F 3 3"]) -> Float[np.ndarray, "G 3 3"]:
@@ -119,7 +119,7 @@ def closest(
     best = np.full(len(points), np.inf)
     best_foot = np.zeros_like(points)
     for face in owner[index.reshape(len(points), -1)].T:
-        foot = trimesh.triangles.closest_point(corners[face], points)
+        foot = np.asarray(trimesh.triangles.closest_point(corners[face], points))  # type: ignore[no-untyped-call]
         distance = np.linalg.norm(foot - points, axis=1)
         nearer = distance < best
         best_face[nearer], best[nearer] = face[nearer], distance[nearer]
@@ -150,4 +150,5 @@ def _components(mesh: Welded) -> Integer[np.ndarray, " F"]:
     a, b = mesh.faces[:, [0, 1, 2]].ravel(), mesh.faces[:, [1, 2, 0]].ravel()
     n = len(mesh.vertices)
     graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n))
-    return np.asarray(connected_components(graph, directed=False)[1])[mesh.faces[:, 0]]
+    labels = np.asarray(connected_components(graph, directed=False)[1])
+    return np.asarray(labels[mesh.faces[:, 0]])

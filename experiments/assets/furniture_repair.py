@@ -75,13 +75,13 @@ def sheets(corners: Float[np.ndarray, "F 3 3"]) -> Bool[np.ndarray, " F"]:
 def areas(corners: Float[np.ndarray, "F 3 3"]) -> Float[np.ndarray, " F"]:
     """Face areas in square metres."""
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.linalg.norm(cross, axis=1) / 2.0
+    return np.asarray(np.linalg.norm(cross, axis=1) / 2.0)
 
 
 def unit_normals(corners: Float[np.ndarray, "F 3 3"]) -> Float[np.ndarray, "F 3"]:
     """Face normals; zero for degenerate faces."""
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-20)
+    return np.asarray(cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-20))
 
 
 def _escapes(

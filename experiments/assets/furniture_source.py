@@ -10,8 +10,8 @@ import io
 import posixpath
 import re
 import zipfile
-from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -132,19 +132,13 @@ def _parse_obj(lines: list[str]) -> _Obj:
             obj.texcoords.append([float(value) for value in rest.split()[:2]])
         elif word == "f":
             corners = [_corner(token, obj) for token in rest.split()]
-            triangles = [[corners[0], b, c] for b, c in _neighbours(corners[1:])]
+            triangles = [[corners[0], b, c] for b, c in pairwise(corners[1:])]
             obj.groups.setdefault(material, []).extend(triangles)
         elif word == "usemtl":
             material = rest.strip()
         elif word == "mtllib":
             obj.libraries.append(rest.strip())
     return obj
-
-
-def _neighbours(
-    items: list[tuple[int, int]],
-) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
-    return zip(items[:-1], items[1:], strict=True)
 
 
 def _corner(token: str, obj: _Obj) -> tuple[int, int]:

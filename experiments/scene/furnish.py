@@ -108,8 +108,21 @@ def _own_frame(item: Item, pack: Pack, source: object) -> tuple[_Body, ...]:
             _Body(p.corners * item.scale, p.corners, p.colour, p.uv, p.texture, p.vertex_colours)
             for p in shapes
         )
+    if np.prod(item.scale) < 0:
+        bodies = tuple(_reversed(body) for body in bodies)
     bodies = _with_normals(bodies)
     return bodies if item.tint is None else _tinted(bodies, item.tint)
+
+
+def _reversed(body: _Body) -> _Body:
+    """The same triangles the other way round: mirroring turns faces inside out."""
+    uv, colours = body.uv, body.vertex_colours
+    return replace(
+        body,
+        corners=body.corners[:, ::-1],
+        uv=None if uv is None else uv[:, ::-1],
+        vertex_colours=None if colours is None else colours[:, ::-1],
+    )
 
 
 def _scale(item: Item, piece: Piece, source: object) -> Float[np.ndarray, " 3"]:

@@ -6,6 +6,7 @@ Frame: metres, z up, origin at the south-west corner of the floor, x east, y nor
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,6 +23,7 @@ Colour = tuple[float, float, float]
 
 LAYOUTS = Path(__file__).with_name("layouts")
 SCHEMA_VERSION = 1
+_VARIATION = re.compile(r"([a-z]+)_v(\d{1,9})")
 
 
 @dataclass(frozen=True)
@@ -96,8 +98,13 @@ class Layout:
 def read_layout(path_or_name: Path | str) -> Layout:
     """Read and check one layout: a path, or the name of a room that comes with the project.
 
-    Raises InputError naming the file, the field and the value at fault.
+    `office_v3` is the variation of `office` with seed 3 (see `variations`). Raises InputError naming
+    the file, the field and the value at fault.
     """
+    if (match := _VARIATION.fullmatch(str(path_or_name))) and match[1] in layout_names():
+        from experiments.scene.variations import vary
+
+        return vary(read_layout(match[1]), int(match[2]))
     source = _source_file(path_or_name)
     try:
         data = tomllib.loads(source.read_text(encoding="utf-8"))

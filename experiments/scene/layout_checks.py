@@ -212,14 +212,14 @@ def _depth(
     near = points[np.all((points > low) & (points < high), axis=1)]
     if len(near) < _OVERLAP_POINTS:
         return 0.0
-    distance = cKDTree(surface).query(near)[0]
-    deep = near[distance > OVERLAP]
-    if len(deep) < _OVERLAP_POINTS:
+    distance = np.asarray(cKDTree(surface).query(near)[0])
+    candidate = np.flatnonzero(distance > OVERLAP)
+    inside = candidate[enclosed(triangles, near[candidate])]
+    if len(inside) < _OVERLAP_POINTS:
         return 0.0
-    inside = enclosed(triangles, deep)
-    order = np.argsort(-distance[distance > OVERLAP][inside], kind="stable")[: 4 * _OVERLAP_POINTS]
-    exact = sorted(nearest_triangle(point, triangles)[0] for point in deep[inside][order])
-    return exact[-_OVERLAP_POINTS] if len(exact) >= _OVERLAP_POINTS else 0.0
+    deepest = inside[np.argsort(-distance[inside], kind="stable")[: 4 * _OVERLAP_POINTS]]
+    exact = sorted(nearest_triangle(point, triangles)[0] for point in near[deepest])
+    return exact[-_OVERLAP_POINTS]
 
 
 def floating(objects: Sequence[PlacedObject], size: tuple[float, float, float]) -> Iterator[str]:

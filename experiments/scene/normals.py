@@ -32,7 +32,7 @@ def creased_normals(
         )
     length = np.linalg.norm(total, axis=1, keepdims=True)
     normals = np.where(length > 1e-20, total / np.maximum(length, 1e-20), unit.repeat(3, axis=0))
-    return normals.reshape(-1, 3, 3)
+    return np.asarray(normals.reshape(-1, 3, 3))
 
 
 def _same_vertex(vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

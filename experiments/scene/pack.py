@@ -45,6 +45,10 @@ class Piece:
     """Height of the seat or mattress, where one sits or lies on it."""
     parts: tuple[PiecePart, ...]
 
+    def points(self) -> Float[np.ndarray, "N 3"]:
+        """All corners of all materials."""
+        return np.concatenate([part.corners.reshape(-1, 3) for part in self.parts])
+
 
 class Pack:
     """An opened pack; pieces are decoded when they are asked for."""

@@ -327,7 +327,7 @@ def _landscape(colour: Colour, seed: int) -> UInt8[np.ndarray, "96 128 3"]:
     sky = 0.45 * base + 0.42
     image = sky + (0.12 * (y - 0.5))[..., None] * np.array([0.9, 1.0, 1.15])
     for layer in range(4):
-        ridge = 0.68 - 0.16 * layer
+        ridge = np.full_like(x, 0.68 - 0.16 * layer)
         for octave in (1, 2, 3, 5):
             amplitude = 0.07 / octave
             ridge = ridge + amplitude * np.sin(2 * np.pi * octave * (x + rng.uniform()))

@@ -38,9 +38,9 @@ def box(size: Vector, at: Vector = (0, 0, 0), bevel: float = 0.0) -> Triangles:
     half = np.asarray(size, float) / 2
     middle = np.add(at, (0.0, 0.0, half[2]))
     if bevel <= 0:
-        return middle + half * _UNIT_BOX
+        return np.asarray(middle + half * _UNIT_BOX)
     bevel = min(bevel, 0.45 * 2 * float(half.min()))
-    return middle + _bevelled(half, bevel)
+    return np.asarray(middle + _bevelled(half, bevel))
 
 
 def lathe(profile: Sequence[tuple[float, float]], segments: int = 24) -> Triangles:
@@ -63,7 +63,7 @@ def cylinder(
 ) -> Triangles:
     """An upright cylinder or truncated cone."""
     top = radius if top_radius is None else top_radius
-    return lathe([(radius, 0.0), (top, height)], segments) + np.asarray(at, float)
+    return np.asarray(lathe([(radius, 0.0), (top, height)], segments) + np.asarray(at, float))
 
 
 def tube(a: Vector, b: Vector, radius: float, segments: int = 10) -> Triangles:
@@ -75,7 +75,7 @@ def tube(a: Vector, b: Vector, radius: float, segments: int = 10) -> Triangles:
     side = np.cross(axis, helper)
     side /= np.linalg.norm(side)
     frame = np.stack([side, np.cross(axis, side), axis])
-    return cylinder(radius, length, segments=segments) @ frame + start
+    return np.asarray(cylinder(radius, length, segments=segments) @ frame + start)
 
 
 def superellipsoid(
@@ -110,7 +110,7 @@ def pillow(size: Vector, at: Vector = (0, 0, 0), n: int = 12) -> Triangles:
     below = np.stack([x, y, 0.5 - 0.5 * puff], -1)
     scale, shift = np.array([1, 1, size[2]]), np.asarray(at, float)
     faces = [surface(top), surface(below)[:, ::-1]]
-    return np.concatenate(faces) * scale + shift
+    return np.asarray(np.concatenate(faces) * scale + shift)
 
 
 def heightfield(
@@ -130,7 +130,7 @@ def heightfield(
         np.stack([base[-1], top[-1]], 1),
     ]
     soup = [surface(top), surface(base)[:, ::-1], *(surface(s) for s in skirts)]
-    return np.concatenate(soup) + np.asarray(at, float)
+    return np.asarray(np.concatenate(soup) + np.asarray(at, float))
 
 
 def sheet(grid: Float[np.ndarray, "N M 3"], thickness: float) -> Triangles:
@@ -150,12 +150,12 @@ def turned(corners: Triangles, axis: str, degrees: float, about: Vector = (0, 0,
     matrix = np.eye(3)
     matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = c, -s, s, c
     centre = np.asarray(about, float)
-    return (corners - centre) @ matrix.T + centre
+    return np.asarray((corners - centre) @ matrix.T + centre)
 
 
 def moved(corners: Triangles, by: Vector) -> Triangles:
     """Translate."""
-    return corners + np.asarray(by, float)
+    return np.asarray(corners + np.asarray(by, float))
 
 
 def surface(grid: Float[np.ndarray, "N M 3"]) -> Triangles:
@@ -163,7 +163,7 @@ def surface(grid: Float[np.ndarray, "N M 3"]) -> Triangles:
     a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
     soup = np.concatenate([np.stack([a, b, c], -2), np.stack([a, c, d], -2)]).reshape(-1, 3, 3)
     area = np.linalg.norm(np.cross(soup[:, 1] - soup[:, 0], soup[:, 2] - soup[:, 0]), axis=1)
-    return soup[area > 1e-10]
+    return np.asarray(soup[area > 1e-10])
 
 
 def _power(value: Float[np.ndarray, "N M"], exponent: float) -> Float[np.ndarray, "N M"]:
