@@ -1,8 +1,4 @@
-"""Batches: the room's parts merged for drawing, cut into clusters that can be drawn alone.
-
-A batch is one texture within one group. Its triangles are ordered by 45 cm cells; a cluster is the
-run of triangles of one cell. A frame redraws only the clusters that the changed rectangle meets.
-"""
+"""Batches: the room's parts checked and merged for drawing, one batch a texture and group."""
 
 from __future__ import annotations
 
@@ -10,18 +6,17 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Integer, UInt8
+from jaxtyping import Float, UInt8
 
 from renderer.files import InputError
 from renderer.stage import StagePart
 
-CELL_M = 0.45
 _TINY_AREA = 1e-12
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Triangles of one group and one texture, with the clusters they fall into."""
+    """Triangles of one group and one texture."""
 
     group: str
     corners: Float[np.ndarray, "F 3 3"]
@@ -32,22 +27,20 @@ class Batch:
     """Openness per corner for each of up to four sets of hidden groups."""
     uv: Float[np.ndarray, "F 3 2"] | None
     texture: UInt8[np.ndarray, "h w 3"] | None
-    starts: Integer[np.ndarray, " C"]
-    """First triangle of each cluster."""
-    counts: Integer[np.ndarray, " C"]
-    boxes: Float[np.ndarray, "C 2 3"]
+    texture_slot: int
+    """Number of the texture, equal for equal textures; -1 for none."""
 
 
 def make_batches(
     parts: Sequence[StagePart], hidden_sets: Sequence[Collection[str]] = ((),)
 ) -> tuple[Batch, ...]:
-    """Check and merge the parts, in a fixed order (group, first appearance of the texture).
+    """Check and merge the parts, in the order in which they are drawn: by texture, then group.
 
     `hidden_sets` are the hidden groups of the (at most four) views: what a view hides no longer
     darkens its surroundings there. Triangles without area are left out. Raises `InputError` for
     coordinates that are not finite and for a texture without texture coordinates.
     """
-    buckets: dict[tuple[str, int], list[StagePart]] = {}
+    buckets: dict[tuple[int, str], list[StagePart]] = {}
     textures: dict[tuple[tuple[int, ...], bytes], int] = {}
     for part in sorted(parts, key=lambda part: part.group):
         _require_sound(part)
@@ -55,8 +48,8 @@ def make_batches(
         if part.texture is not None:
             content = (part.texture.shape, part.texture.tobytes())
             slot = textures.setdefault(content, len(textures))
-        buckets.setdefault((part.group, slot), []).append(part)
-    merged = (_merge(group, members, hidden_sets) for (group, _), members in buckets.items())
+        buckets.setdefault((slot, part.group), []).append(part)
+    merged = (_merge(*key, buckets[key], hidden_sets) for key in sorted(buckets))
     return tuple(batch for batch in merged if len(batch.corners))
 
 
@@ -79,7 +72,7 @@ def _require_sound(part: StagePart) -> None:
 
 
 def _merge(
-    group: str, members: Sequence[StagePart], hidden_sets: Sequence[Collection[str]]
+    slot: int, group: str, members: Sequence[StagePart], hidden_sets: Sequence[Collection[str]]
 ) -> Batch:
     corners = np.concatenate([part.corners for part in members]).astype(np.float32)
     normals = np.concatenate([part.normals for part in members]).astype(np.float32)
@@ -92,14 +85,8 @@ def _merge(
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(cross, axis=1)
     kept = np.flatnonzero(area > _TINY_AREA)
-    order, starts, counts = _clusters(corners[kept])
-    kept = kept[order]
     corners = corners[kept]
     face_normals = (cross[kept] / area[kept, None])[:, None]
-    boxes = [
-        np.stack([corners[s : s + n].min(axis=(0, 1)), corners[s : s + n].max(axis=(0, 1))])
-        for s, n in zip(starts, counts, strict=True)
-    ]
     return Batch(
         group=group,
         corners=corners,
@@ -108,9 +95,7 @@ def _merge(
         occlusion=np.nan_to_num(occlusion[kept], nan=1.0),
         uv=None if uv is None else uv[kept],
         texture=members[0].texture,
-        starts=starts,
-        counts=counts,
-        boxes=np.array(boxes, dtype=np.float64).reshape(-1, 2, 3),
+        texture_slot=slot,
     )
 
 
@@ -120,20 +105,6 @@ def _occlusion(
     slots = [part.occlusion_without(hidden) for hidden in hidden_sets]
     slots += slots[-1:] * (4 - len(slots))
     return np.stack(slots, axis=-1).astype(np.float32)
-
-
-def _clusters(
-    corners: Float[np.ndarray, "F 3 3"],
-) -> tuple[Integer[np.ndarray, " F"], Integer[np.ndarray, " C"], Integer[np.ndarray, " C"]]:
-    """Order of the triangles by cell, and first triangle and length of each cell's run."""
-    cells = np.floor(corners.mean(axis=1) / CELL_M).astype(np.int64)
-    order = np.lexsort((np.arange(len(cells)), cells[:, 2], cells[:, 1], cells[:, 0]))
-    ordered = cells[order]
-    new = np.ones(len(ordered), dtype=bool)
-    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    starts = np.flatnonzero(new)
-    counts = np.diff(np.append(starts, len(ordered)))
-    return order, starts, counts
 
 
 def _usable_normals(

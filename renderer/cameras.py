@@ -26,7 +26,7 @@ ELEVATIONS_DEG = (32.0, 25.0, 40.0)
 """In order of preference: an equal score takes the earlier one."""
 OFFSETS_DEG = (45.0, 30.0, 60.0, 15.0, 75.0, 0.0)
 """Azimuth of the first of four views 90 degrees apart, corner views preferred."""
-CORNER_BONUS = 0.03
+CORNER_BONUS = 0.08
 """Score that a fully corner-on rig may give up before a more frontal one replaces it."""
 NEAR_M, FAR_M = 0.1, 60.0
 

@@ -9,6 +9,8 @@ makes the whole picture dirty.
 
 from __future__ import annotations
 
+import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +19,8 @@ from jaxtyping import Bool, Float, Integer
 from renderer.light import LightBox
 
 CONTACT_HEIGHT_M, CONTACT_DEPTH_M = 0.30, 0.10
-CONTACT_RADIUS_M = 0.14
-"""Reach of the contact darkening to the side, filter and map texels included."""
+CONTACT_STEP_M = 0.028
+"""Distance of the 4 x 4 looks that the shader takes into the contact map (mesh.frag)."""
 PIXEL_MARGIN = 2
 _CLOSE_M = 0.3
 
@@ -57,24 +59,36 @@ class Projection:
     width: int
     height: int
 
-    def rect_of(self, points: Float[np.ndarray, "N 3"], radius: float) -> Rect:
-        """Rectangle around balls of this radius (metres) at the points; whole picture if close."""
-        seen = points @ self.view[:3, :3].T + self.view[:3, 3]
-        depth = -seen[:, 2]
-        near = float(depth.min()) - radius
+    def seen(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "3 N"]:
+        """Points in camera axes (right, up, back), one row an axis."""
+        rows: np.ndarray = self.view[:3, :3] @ points.T + self.view[:3, 3:]
+        return rows
+
+    def turned(self, vector: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 1"]:
+        """A world direction in camera axes, as a column."""
+        column: np.ndarray = (self.view[:3, :3] @ vector)[:, None]
+        return column
+
+    def rect_of(self, seen: Float[np.ndarray, "3 N"], radius: float) -> Rect:
+        """Rectangle (not clipped) around balls of this radius (m) at points in camera axes.
+
+        The whole picture if one of them is close to the camera plane. A ball of radius r at depth
+        d reaches at most r (scale + offset) / (d - r) pixels from the picture of its centre.
+        """
+        near = -float(seen[2].max()) - radius
         if near < _CLOSE_M:
             return Rect(0, 0, self.width, self.height)
-        scale = np.array([
-            self.projection[0, 0] * self.width / 2,
-            self.projection[1, 1] * self.height / 2,
-        ])  # fmt: skip
-        pixels = seen[:, :2] / depth[:, None] * scale + np.array([self.width, self.height]) / 2
-        # A ball of radius r at depth d reaches at most r (scale + |offset|) / (d - r) pixels.
-        offset = np.abs(pixels - np.array([self.width, self.height]) / 2).max(axis=0)
-        reach = radius * (scale + offset) / near + PIXEL_MARGIN
-        low = np.floor(pixels.min(axis=0) - reach).astype(int)
-        high = np.ceil(pixels.max(axis=0) + reach).astype(int)
-        return self.clip(Rect(int(low[0]), int(low[1]), int(high[0]), int(high[1])))
+        ends: list[int] = []
+        for axis, size in enumerate((self.width, self.height)):
+            scale = float(self.projection[axis, axis]) * size / 2
+            pixels = seen[axis] / seen[2]
+            offsets = -scale * float(pixels.max()), -scale * float(pixels.min())
+            reach = radius * (scale + max(map(abs, offsets))) / near + PIXEL_MARGIN
+            ends += [
+                math.floor(offsets[0] + size / 2 - reach),
+                math.ceil(offsets[1] + size / 2 + reach),
+            ]
+        return Rect(ends[0], ends[2], ends[1], ends[3])
 
     def clip(self, rect: Rect) -> Rect:
         """The part inside the picture."""
@@ -85,10 +99,8 @@ class Projection:
             min(rect.top, self.height),
         )
 
-    def box_rects(self, boxes: Float[np.ndarray, "C 2 3"]) -> Integer[np.ndarray, "C 4"]:
-        """Left, bottom, right, top of axis-aligned boxes; a box near the camera covers all."""
-        picks = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
-        corners = boxes[:, picks, np.arange(3)]
+    def rects_of(self, corners: Float[np.ndarray, "C K 3"]) -> Integer[np.ndarray, "C 4"]:
+        """Left, bottom, right, top around each triangle; one near the camera covers all."""
         seen = corners @ self.view[:3, :3].T + self.view[:3, 3]
         depth = -seen[..., 2]
         close = depth.min(axis=1) < _CLOSE_M
@@ -110,20 +122,30 @@ def dirty_rect(
     direction: Float[np.ndarray, "3"],
     lowest_z: float,
     shadow_radius: float,
+    contact_radius: float,
 ) -> Rect:
     """Pixels that may differ from the empty room when the body stands there.
 
     `direction` is that of the key light; `lowest_z` the room's lowest height (m), below which no
-    shadow is seen; `shadow_radius` (m) the reach of the shadow filter in the world.
+    shadow is seen; `shadow_radius` and `contact_radius` (m) are the reaches of the two filters.
     """
-    body = np.asarray(vertices, dtype=np.float64)
-    fall = np.maximum(body[:, 2] - (lowest_z - 2 * shadow_radius), 0.0) / -direction[2]
-    shadow = body + fall[:, None] * direction
-    above = body + np.array([0.0, 0.0, CONTACT_DEPTH_M])
-    below = body - np.array([0.0, 0.0, CONTACT_HEIGHT_M])
-    cast = camera.rect_of(np.concatenate([body, shadow]), shadow_radius)
-    contact = camera.rect_of(np.concatenate([above, below]), CONTACT_RADIUS_M)
-    return _union(cast, contact)
+    body = camera.seen(np.asarray(vertices, dtype=np.float64))
+    fall = np.maximum(vertices[:, 2] - (lowest_z - 2 * shadow_radius), 0.0) / -direction[2]
+    shadow = body + fall * camera.turned(direction)
+    up = camera.turned(np.array([0.0, 0.0, 1.0]))
+    rects = [
+        camera.rect_of(body, shadow_radius),
+        camera.rect_of(shadow, shadow_radius),
+        camera.rect_of(body + CONTACT_DEPTH_M * up, contact_radius),
+        camera.rect_of(body - CONTACT_HEIGHT_M * up, contact_radius),
+    ]
+    # Clipped only now: the ends of a segment may lie beyond different sides of the picture.
+    return camera.clip(functools.reduce(_union, rects))
+
+
+def contact_reach(texel: float) -> float:
+    """How far to the side (metres) the body darkens a surface below it, given the map's texel."""
+    return math.sqrt(2) * (1.5 * CONTACT_STEP_M + texel) + 0.002
 
 
 def meets(rects: Integer[np.ndarray, "C 4"], rect: Rect) -> Bool[np.ndarray, " C"]:
@@ -136,16 +158,16 @@ def meets(rects: Integer[np.ndarray, "C 4"], rect: Rect) -> Bool[np.ndarray, " C
 
 def shadow_rect(box: LightBox, vertices: Float[np.ndarray, "V 3"], shadow_size: int) -> Rect:
     """Texels of the shadow map that the body covers, with a margin."""
-    seen = np.asarray(vertices, np.float64) @ box.view[:2, :3].T + box.view[:2, 3]
-    texels = (seen * np.array([1 / box.half_width, 1 / box.half_height]) * 0.5 + 0.5) * shadow_size
-    low, high = np.floor(texels.min(axis=0)) - 2, np.ceil(texels.max(axis=0)) + 2
-    low, high = np.clip(low, 0, shadow_size), np.clip(high, 0, shadow_size)
-    return Rect(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+    seen = box.view[:2, :3] @ np.asarray(vertices, np.float64).T + box.view[:2, 3:]
+    ends: list[int] = []
+    for row, half in zip(seen, (box.half_width, box.half_height), strict=True):
+        low, high = (0.5 * shadow_size * (float(x) / half + 1) for x in (row.min(), row.max()))
+        ends += [math.floor(low) - 2, math.ceil(high) + 2]
+    left, right, bottom, top = (min(max(end, 0), shadow_size) for end in ends)
+    return Rect(left, bottom, right, top)
 
 
 def _union(a: Rect, b: Rect) -> Rect:
-    if a.is_empty or b.is_empty:
-        return b if a.is_empty else a
     return Rect(
         min(a.left, b.left),
         min(a.bottom, b.bottom),

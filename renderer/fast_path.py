@@ -1,12 +1,14 @@
 """One frame quickly: only the rectangle that the body and its shadows can change is drawn.
 
-Exact, not approximate: the rectangle is a bound, and inside it the same triangles are drawn in the
-same order into the same multisampled buffer as in a full redraw (tests compare every pixel).
+Exact, not approximate: the rectangle is a bound, and inside it every triangle that can win a sample
+is drawn in the same order into the same multisampled buffer as in a full redraw (tests compare
+every pixel with pyrender's own passes).
 Import only inside an `offscreen` block.
 """
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any
 
 import numpy as np
@@ -16,8 +18,8 @@ from pyrender.constants import ProgramFlags
 
 from renderer import light
 from renderer.body_layer import BodyLayer
-from renderer.dirty import Rect, dirty_rect, meets, shadow_rect
-from renderer.gl_renderer import FLAGS
+from renderer.dirty import Rect, contact_reach, dirty_rect, shadow_rect
+from renderer.gl_renderer import CONTACT_SIZE, FLAGS
 from renderer.static_room import ShadowSlot, StaticRoom, ViewState, copy_depth
 
 _SHADOW_REACH_TEXELS = 6.0
@@ -33,7 +35,6 @@ class FastPath:
         self._room, self._body = room, body
         if not body.primitive._in_context():
             body.primitive._add_to_context()
-        self._owner, self._starts, self._counts = _cluster_table(room)
         self._body_rects: dict[int, Rect] = {}
         self._drawn_for: dict[int, int] = {}
         self._frame = 0
@@ -62,9 +63,11 @@ class FastPath:
 
     def rect_of(self, state: ViewState) -> Rect:
         """The pixels that are redrawn for the present body."""
-        reach = _SHADOW_REACH_TEXELS * self._room.box.texel(self._room.settings.shadow_size)
+        room = self._room
+        shadow = _SHADOW_REACH_TEXELS * room.box.texel(room.settings.shadow_size)
+        contact = contact_reach(room.sky.texel(CONTACT_SIZE))
         return dirty_rect(
-            state.projection, self._body.vertices, _DIRECTION, self._room.lowest_z, reach
+            state.projection, self._body.vertices, _DIRECTION, room.lowest_z, shadow, contact
         )
 
     def forget_shadow(self, slot: ShadowSlot) -> None:
@@ -118,7 +121,7 @@ class FastPath:
         GL.glClear(GL.GL_COLOR_BUFFER_BIT | GL.GL_DEPTH_BUFFER_BIT)
         _bind_texture(0, int(state.slot.working._texid))
         _bind_texture(1, renderer.contact.texture)
-        self._draw_clusters(state, rect)
+        self._draw_room(state, rect)
         self._use("body", state)
         self._body.draw()
         GL.glUseProgram(0)
@@ -126,23 +129,17 @@ class FastPath:
         GL.glDisable(GL.GL_SCISSOR_TEST)
         return pixels
 
-    def _draw_clusters(self, state: ViewState, rect: Rect) -> None:
-        chosen = np.flatnonzero(meets(state.cluster_rects, rect))
+    def _draw_room(self, state: ViewState, rect: Rect) -> None:
         used = ""
-        for index in np.unique(self._owner[chosen]):
-            batch, primitive = self._room.batches[index], self._room.primitives[index]
-            if batch.group not in state.shown:
-                continue
-            kind = "plain" if batch.texture is None else "textured"
+        for slot, offset, count in state.geometry.select(rect):
+            kind = "plain" if slot < 0 else "textured"
             if kind != used:
                 self._use(kind, state)
                 used = kind
-            if batch.texture is not None:
-                _bind_texture(2, int(primitive.material.baseColorTexture._texid))
-            members = chosen[self._owner[chosen] == index]
-            starts, counts = _merged(self._starts[members], self._counts[members])
-            primitive._bind()
-            GL.glMultiDrawArrays(GL.GL_TRIANGLES, starts, counts, len(starts))
+            if slot >= 0:
+                _bind_texture(2, int(self._room.textures[slot]._texid))
+            state.geometry.bind()
+            GL.glDrawElements(GL.GL_TRIANGLES, count, GL.GL_UNSIGNED_INT, ctypes.c_void_p(offset))
         GL.glBindVertexArray(0)
 
     def _use(self, kind: str, state: ViewState) -> None:
@@ -229,20 +226,3 @@ def _set_state() -> None:
 def _bind_texture(unit: int, texture: int) -> None:
     GL.glActiveTexture(GL.GL_TEXTURE0 + unit)
     GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
-
-
-def _cluster_table(room: StaticRoom) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Per cluster of the whole room: its batch, its first vertex, its number of vertices."""
-    owner = [np.full(len(batch.starts), index) for index, batch in enumerate(room.batches)]
-    starts = [3 * batch.starts for batch in room.batches]
-    counts = [3 * batch.counts for batch in room.batches]
-    return np.concatenate(owner), np.concatenate(starts), np.concatenate(counts)
-
-
-def _merged(starts: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Join runs that follow one another, as int32 for OpenGL."""
-    ends = starts + counts
-    first = np.ones(len(starts), dtype=bool)
-    first[1:] = starts[1:] != ends[:-1]
-    last = np.append(first[1:], True)
-    return starts[first].astype(np.int32), (ends[last] - starts[first]).astype(np.int32)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pyrender
-from jaxtyping import Float, Integer, UInt8
+from jaxtyping import Float, UInt8
 from OpenGL import GL
 from pyrender.primitive import Primitive
 
@@ -23,6 +23,8 @@ from renderer.gl_renderer import FLAGS, RoomRenderer
 from renderer.leftovers import leftover_parts, shown_groups
 from renderer.settings import RenderSettings
 from renderer.stage import StagePart
+from renderer.view_geometry import ViewGeometry
+from renderer.visible_set import visible_triangles
 
 _BODY_NODE = "~body"
 """Sorts behind all room nodes, so the body is drawn last."""
@@ -34,10 +36,9 @@ class ViewState:
 
     view: CameraView
     projection: Projection
-    shown: frozenset[str]
     background: UInt8[np.ndarray, "h w 3"]
     slot: ShadowSlot
-    cluster_rects: Integer[np.ndarray, "C 4"]
+    geometry: ViewGeometry
 
 
 @dataclass
@@ -69,11 +70,13 @@ class StaticRoom:
         self.batches = make_batches(self.parts, hidden_sets)
         self.lowest_z = min(float(batch.corners[..., 2].min()) for batch in self.batches)
         self.box = light.light_box(room_size, floor_z)
+        self.sky = light.sky_box(room_size, floor_z)
         self.renderer = RoomRenderer(
             settings.width, settings.height, settings.msaa, settings.shadow_size, self.box,
-            light.sky_box(room_size, floor_z), context_key,
+            self.sky, context_key,
         )  # fmt: skip
         self.scene, self.light, self._camera_node = self._empty_scene()
+        self.textures: dict[int, pyrender.Texture] = {}
         self.primitives, self._nodes = self._add_batches()
         self._body_node: pyrender.Node | None = None
         self.views: list[ViewState] = []
@@ -81,17 +84,19 @@ class StaticRoom:
         for view in views:
             self._add_view(view)
 
-    def _add_view(self, view: CameraView) -> ViewState:
+    def _add_view(self, view: CameraView) -> None:
         """Draw the empty room for this camera and keep its picture and shadow map."""
         projection = self.aim(view)
         shown = frozenset(shown_groups(self.parts, view.hidden))
         slot = self._slots.get(shown) or self._new_slot(shown)
         background = self.full_redraw_of(view, slot, body=None)
         copy_depth(slot.working, slot.static, self.settings.shadow_size)
-        boxes = np.concatenate([batch.boxes for batch in self.batches])
-        state = ViewState(view, projection, shown, background, slot, projection.box_rects(boxes))
-        self.views.append(state)
-        return state
+        visible = visible_triangles(
+            self.batches, self.primitives, shown, projection, self.settings.msaa,
+            self.renderer._program_cache,
+        )  # fmt: skip
+        geometry = ViewGeometry(self.batches, visible, projection)
+        self.views.append(ViewState(view, projection, background, slot, geometry))
 
     def full_redraw_of(
         self, view: CameraView, slot: ShadowSlot, body: BodyLayer | None
@@ -129,6 +134,8 @@ class StaticRoom:
         """Free every GL object of this room."""
         self._set_body(None)
         self.light._shadow_texture = None
+        for state in self.views:
+            state.geometry.delete()
         for slot in self._slots.values():
             slot.static._remove_from_context()
             slot.working._remove_from_context()
@@ -146,10 +153,9 @@ class StaticRoom:
         return scene, key, camera
 
     def _add_batches(self) -> tuple[list[Primitive], list[pyrender.Node]]:
-        textures: dict[tuple[tuple[int, ...], bytes], pyrender.Texture] = {}
         primitives, nodes = [], []
         for index, batch in enumerate(self.batches):
-            primitive = _primitive(batch, textures)
+            primitive = _primitive(batch, self.textures)
             node = pyrender.Node(name=f"{index:06d}", mesh=pyrender.Mesh([primitive]))
             self.scene.add_node(node)
             primitives.append(primitive)
@@ -209,15 +215,11 @@ def copy_depth(
     )  # fmt: skip
 
 
-def _primitive(
-    batch: Batch, textures: dict[tuple[tuple[int, ...], bytes], pyrender.Texture]
-) -> Primitive:
-    texture = None
-    if batch.texture is not None:
-        key = (batch.texture.shape, batch.texture.tobytes())
-        if key not in textures:
-            textures[key] = pyrender.Texture(source=batch.texture, source_channels="RGB")
-        texture = textures[key]
+def _primitive(batch: Batch, textures: dict[int, pyrender.Texture]) -> Primitive:
+    texture = textures.get(batch.texture_slot)
+    if texture is None and batch.texture is not None:
+        texture = pyrender.Texture(source=batch.texture, source_channels="RGB")
+        textures[batch.texture_slot] = texture
     count = 3 * len(batch.corners)
     opaque = np.ones((count, 1), dtype=np.float32)
     uv = np.zeros((count, 2), np.float32) if batch.uv is None else batch.uv.reshape(-1, 2)

@@ -16,7 +16,7 @@ KEY_FRAMES = 10
 PLAIN_SAMPLES, REGION_SAMPLES = 240, 60
 REGION_REACH_M = 0.08
 """A region counts with its surroundings: soles face down, it is the foot above that is seen."""
-REGION_WEIGHTS = {"sole": 0.30, "foot": 0.30, "feet": 0.30, "pelvis": 0.20, "hand": 0.12}
+REGION_WEIGHTS = {"sole": 0.30, "foot": 0.30, "pelvis": 0.20, "buttocks": 0.20, "hand": 0.12}
 """Share of the score by the beginning of a region's name; the rest is spread over the body."""
 START_M = 0.015
 """Rays start this far off the skin, or touching furniture would hide every contact."""

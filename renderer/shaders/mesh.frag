@@ -46,7 +46,7 @@ out vec4 frag_color;
 const float PI = 3.141592653589793;
 const float CONTACT_HEIGHT = 0.30;   // metres; keep equal to dirty.CONTACT_HEIGHT_M
 const float CONTACT_DEPTH = 0.10;    // metres; keep equal to dirty.CONTACT_DEPTH_M
-const float CONTACT_STEP = 0.028;    // metres; keep 2.5 steps below dirty.CONTACT_RADIUS_M
+const float CONTACT_STEP = 0.028;    // metres; keep equal to dirty.CONTACT_STEP_M
 const float CONTACT_STRENGTH = 0.62;
 
 vec3 decoded(vec3 srgb)
@@ -76,8 +76,8 @@ float lit(vec3 n, float nl)
     float sum = 0.0;
     for (int x = -1; x <= 1; x++) {
         for (int y = -1; y <= 1; y++) {
-            sum += texture(directional_lights[0].shadow_map,
-                           vec3(at.xy + vec2(x, y) * texel, at.z));
+            sum += textureLod(directional_lights[0].shadow_map,
+                              vec3(at.xy + vec2(x, y) * texel, at.z), 0.0);
         }
     }
     return sum / 9.0;
@@ -95,7 +95,7 @@ float covered(vec3 n)
     float sum = 0.0;
     for (int x = 0; x < 4; x++) {
         for (int y = 0; y < 4; y++) {
-            vec2 seen = texture(contact_map, at + (vec2(x, y) - 1.5) * step_uv).rg;
+            vec2 seen = textureLod(contact_map, at + (vec2(x, y) - 1.5) * step_uv, 0.0).rg;
             if (seen.r > 0.0) {
                 float gap = seen.g / seen.r - world.z;
                 // Skin that is pressed a little into the surface still counts as touching it.
@@ -116,6 +116,8 @@ void main()
 #ifdef COLOR_0_LOC
     albedo *= tint;
 #endif
+    // Nothing real is blacker than this; black lacquer would lose its shape altogether.
+    albedo = mix(vec3(0.028), vec3(1.0), albedo);
     vec3 n = normalize(surface_normal);
     vec3 to_key = -directional_lights[0].direction;
     float nl = dot(n, to_key);
