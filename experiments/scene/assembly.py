@@ -9,15 +9,16 @@ import numpy as np
 from jaxtyping import Float
 
 from experiments.cache import cache_path
+from experiments.scene.furniture_distance import Solid
 from experiments.scene.objects import PlacedObject
 from experiments.scene.scene import MPCAT40, Instance, Scene, Volumes
 from experiments.scene.shell import shell_walls
-from experiments.scene.volumes import FLOOR, WALL, Solid, bake_volumes
+from experiments.scene.volumes import FLOOR, WALL, bake_volumes
 from renderer.files import atomic_path
 
 CELL = 0.025
 THICKNESS = 0.01
-_ALGORITHM = "volumes-1"
+_ALGORITHM = "volumes-5"
 """Named in the cache key: change it whenever the same input gives other volumes."""
 
 

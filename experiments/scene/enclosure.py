@@ -62,11 +62,13 @@ def occluded(
     scene: EmbreeScene,
     origins: Float32[np.ndarray, "N 3"],
     directions: Float32[np.ndarray, "N 3"],
+    length: float = np.inf,
 ) -> Bool[np.ndarray, " N"]:
-    """Whether each ray meets a triangle."""
+    """Whether each ray meets a triangle within `length` (in lengths of its direction)."""
     if not len(origins):
         return np.zeros(0, dtype=bool)
-    hit = scene.run(origins, np.ascontiguousarray(directions), query="OCCLUDED")
+    reach = np.full(len(origins), min(length, 1e30), dtype=np.float32)
+    hit = scene.run(origins, np.ascontiguousarray(directions), reach, query="OCCLUDED")
     found: Bool[np.ndarray, " N"] = np.asarray(hit >= 0)
     return found
 

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from experiments.scene.enclosure import vote_directions
-from experiments.scene.volumes import FLOOR, WALL, Solid
+from experiments.scene.furniture_distance import Solid
+from experiments.scene.volumes import FLOOR, WALL
 
 
 def exact_distance(
