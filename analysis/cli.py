@@ -55,7 +55,35 @@ def analyze(
     click.echo(f"\nwritten: {out / 'report.html'}, results.json, tables and figures beside it")
 
 
-COMMANDS = {"analyze": analyze}
+@click.command("check-claims", context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("text", type=FILE)
+@click.option(
+    "--results",
+    type=FILE,
+    help="results.json to compare with; without it, only the text with itself.",
+)
+@click.option(
+    "--claims",
+    type=FILE,
+    help="Names and aliases; default: claims.toml beside TEXT, then the results' names.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def check_claims(text: Path, results: Path | None, claims: Path | None, as_json: bool) -> None:
+    """Compare the numbers in TEXT (.tex, .md) with results and one another; exit 1 on a mismatch."""
+    from dataclasses import asdict
+
+    from analysis.claims import check_text, claims_table
+
+    found = check_text(text, claims, results)
+    wrong = sum(claim.verdict == "MISMATCH" for claim in found)
+    if as_json:
+        click.echo(json.dumps({"mismatches": wrong, "claims": [asdict(claim) for claim in found]}))
+    else:
+        click.echo(claims_table(found))
+    sys.exit(1 if wrong else 0)
+
+
+COMMANDS = {"analyze": analyze, "check-claims": check_claims}
 
 
 def main(name: str) -> None:
