@@ -31,6 +31,8 @@ const outbox = new Outbox({
   onAnswered: (next) => location.replace(next),
 });
 
+const failedKey = `failed-${page.dataset.trial}`;
+const failedBefore = Number(sessionStorage.getItem(failedKey) ?? 0);
 let paintedAt = 0;
 let allowedAt = 0;
 let failures = 0;
@@ -158,12 +160,10 @@ function measurements() {
 /** A clip that cannot be had: say so, offer to try again, and after a second try to go on. */
 function failed() {
   failures += 1;
-  const key = `failed-${page.dataset.trial}`;
-  const before = Number(sessionStorage.getItem(key) ?? 0);
-  if (failures === 1) sessionStorage.setItem(key, String(before + 1));
+  sessionStorage.setItem(failedKey, String(failedBefore + 1));
   say(text("Failed"));
   byId("trouble").hidden = false;
-  byId("skip").hidden = before === 0;
+  byId("skip").hidden = failedBefore === 0;
 }
 
 async function skip() {

@@ -64,7 +64,7 @@ export class ClipWatch {
     on("ended", () => this.complete());
     on("error", () => this.error());
     document.addEventListener("visibilitychange", () => this.visibility());
-    if (this.video.error) this.error();
+    if (this.video.error) queueMicrotask(() => this.error()); // it failed before this script ran
   }
 
   /** Resolves when the clip can run to its end, so that two clips start in step. */

@@ -170,9 +170,7 @@ def test_choosing_opens_only_after_both_clips_were_played_to_the_end(
     expect(page.locator("#seen-first")).to_have_text("✓")
     expect(page.get_by_test_id("choose-first")).to_be_disabled()
     # Seeking to the end fires `ended` at once; it must not count as seen.
-    page.evaluate(
-        "() => { const v = document.querySelector('#video-second'); v.currentTime = v.duration; return v.play(); }"
-    )
+    page.locator("#video-second").evaluate("v => { v.currentTime = v.duration; return v.play(); }")
     page.wait_for_function("() => document.querySelector('#video-second').ended")
     expect(page.get_by_test_id("choose-first")).to_be_disabled()
     page.get_by_test_id("play-second").click()
