@@ -80,10 +80,12 @@ def body_supports(moving: MovingBody) -> list[Support]:
     supports.append(
         (underside(moving, seated, ("buttocks", "thigh_backs")), seats_for(seat_height))
     )
-    for side in ("left", "right"):
-        touch = palm_touch(moving, side, floor) & ~(lying | seated)[:, None]
-        for mask, classes in _palm_supports(moving, touch):
-            supports.append((mask, classes))
+    hands = [_palm_supports(moving, palm_touch(moving, side, floor)) for side in ("left", "right")]
+    upright = ~(lying | seated)[:, None]
+    # Both hands lean on the same thing, so one class is chosen for the two of them.
+    supports += [
+        ((left | right) & upright, names) for (left, names), (right, _) in zip(*hands, strict=True)
+    ]
     return supports
 
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from experiments.placement.candidates import Starts, class_match
 from experiments.placement.errors import NoAdmissibleStart, OptimisationFailed
@@ -41,6 +43,11 @@ def fault(problem: Problem, fit: Fit) -> str:
         depth = deepest_vertex(problem, fit)
         if depth > settings.max_depth:
             return f"is {depth:.2f} m deep inside something"
+    if settings.max_gap is not None:
+        gap = contact_gap(problem, fit)
+        if gap > settings.max_gap:
+            expected = ", ".join(problem.expected_classes())
+            return f"stays {100 * gap:.0f} cm away from what it expects to touch ({expected})"
     if settings.start_filter is not None:
         rigid = Starts(np.array([fit.yaw]), fit.translation[None], np.zeros(1))
         match = float(class_match(problem, rigid)[0])
@@ -52,11 +59,20 @@ def fault(problem: Problem, fit: Fit) -> str:
 
 def deepest_vertex(problem: Problem, fit: Fit) -> float:
     """How deep the deepest vertex without contact is inside anything, over all frames, metres."""
+    return float((-_distance(problem, fit))[~problem.contact].max().clamp(min=0.0))
+
+
+def contact_gap(problem: Problem, fit: Fit) -> float:
+    """Mean distance of the contacts beyond the floor from the scene, metres; 0 without any."""
+    beyond = problem.beyond_floor()
+    return float(_distance(problem, fit)[beyond].abs().mean()) if beyond.any() else 0.0
+
+
+def _distance(problem: Problem, fit: Fit) -> Float[Tensor, "T V"]:
     placed = torch.tensor([fit.yaw, *fit.translation], dtype=problem.k.dtype)
     with torch.no_grad():
         bodies = altered_bodies(problem, placed, fit.delta, fit.shift)
-        depth = -problem.field.distance(bodies, problem.contact)
-    return float(depth[~problem.contact].max().clamp(min=0.0))
+        return problem.field.distance(bodies, problem.contact)
 
 
 def to_placement(

@@ -38,14 +38,17 @@ class PlacementSettings:
     """Start positions keep this distance from the walls, metres (POSA: 0.75)."""
     start_layers: tuple[float, ...] = (0.0,)
     """Heights of the clip's floor above the scene's floor at the start, metres."""
-    start_filter: float | None = 0.5
-    """Reject starts where less than this share of the contact vertices that expect something other
-    than floor stand nearest to their class (ours); None keeps all."""
+    start_filter: float | None = 0.75
+    """Reject starts and fits where less than this share of the contact vertices stand nearest to
+    the class they expect, floor and all else counted apart (ours); None keeps all."""
     wall_clearance: float = 0.15
     """The pelvis path stays this far inside the room, metres (ours)."""
     max_depth: float | None = 0.20
     """Reject a fit where a vertex without contact is deeper than this inside something,
     metres (ours); None keeps all."""
+    max_gap: float | None = 0.06
+    """Reject a fit whose contacts with anything but floor are further than this from the scene on
+    average, metres (ours): hands that lean on air. None keeps all."""
     coarse_frames: int = 20
     """Frames of the first, coarse scoring of all starts."""
     coarse_vertices: int = 90
@@ -114,6 +117,7 @@ PRESETS: dict[str, PlacementSettings] = {
         inset=0.75,
         start_filter=None,
         max_depth=None,
+        max_gap=None,
         n_starts=10,
         n_altered=10,
         huber_widths=(0.0,),

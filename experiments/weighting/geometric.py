@@ -15,6 +15,9 @@ from experiments.weighting.weights import FrameWeights
 
 SMOOTHING_S = 2.0 / 30.0
 """Standard deviation of the smoothing of speed over time: two frames at 30 per second."""
+EVEN_SHARE = 0.25
+"""Given to every frame before the ranks: k also stiffens E_alt, and a frame with a weight near zero
+would be free to jump."""
 MOTION_SHARE, RARITY_SHARE, STRENGTH_SHARE = 0.3, 0.5, 0.2
 CONTACT_THRESHOLD = 0.5
 _FLOOR = 2
@@ -31,7 +34,8 @@ def geometric_weights(
     """
     contact = features.contact > CONTACT_THRESHOLD
     mix = (
-        MOTION_SHARE * relative_rank(motion_speed(vertices, times))
+        EVEN_SHARE
+        + MOTION_SHARE * relative_rank(motion_speed(vertices, times))
         + RARITY_SHARE * relative_rank(interaction_rarity(features, contact))
         + STRENGTH_SHARE * relative_rank(interaction_strength(features, contact))
     )
