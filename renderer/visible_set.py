@@ -32,7 +32,7 @@ def visible_triangles(
     Every triangle is drawn with its number as colour into a buffer with the picture's own sample
     positions, and every sample is read back.
     """
-    target = _IdTarget(camera.width, camera.height, max(samples, 1))
+    target = _IdTarget(camera.width, camera.height, samples)
     try:
         target.bind()
         _draw_numbers(batches, primitives, shown, camera, programs)
@@ -67,39 +67,32 @@ def _draw_numbers(
 
 
 class _IdTarget:
-    """A multisampled buffer of triangle numbers, and a plain one to read a sample from."""
+    """A buffer of triangle numbers sampled like the picture, and a plain one to read it through."""
 
     def __init__(self, width: int, height: int, samples: int) -> None:
         self._size, self._samples = (width, height), samples
+        self._plain = _renderbuffer(GL.GL_R32UI, 0, width, height)
+        self._depth = _renderbuffer(GL.GL_DEPTH_COMPONENT24, samples, width, height)
         self._texture = int(GL.glGenTextures(1))
-        GL.glBindTexture(GL.GL_TEXTURE_2D_MULTISAMPLE, self._texture)
-        GL.glTexImage2DMultisample(
-            GL.GL_TEXTURE_2D_MULTISAMPLE, samples, GL.GL_R32UI, width, height, GL.GL_TRUE
-        )
-        buffers = GL.glGenRenderbuffers(2)
-        self._depth, self._plain = int(buffers[0]), int(buffers[1])
-        GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, self._depth)
-        GL.glRenderbufferStorageMultisample(
-            GL.GL_RENDERBUFFER, samples, GL.GL_DEPTH_COMPONENT24, width, height
-        )
-        GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, self._plain)
-        GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, GL.GL_R32UI, width, height)
         frames = GL.glGenFramebuffers(2)
         self._frame, self._plain_frame = int(frames[0]), int(frames[1])
+        _attach(self._plain_frame, GL.GL_COLOR_ATTACHMENT0, self._plain)
+        if samples:
+            kind = GL.GL_TEXTURE_2D_MULTISAMPLE
+            GL.glBindTexture(kind, self._texture)
+            GL.glTexImage2DMultisample(kind, samples, GL.GL_R32UI, width, height, GL.GL_TRUE)
+            GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._frame)
+            GL.glFramebufferTexture2D(
+                GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, kind, self._texture, 0
+            )
+        else:
+            # A multisampled buffer has no sample in the pixel's centre, where this picture has it.
+            _attach(self._frame, GL.GL_COLOR_ATTACHMENT0, self._plain)
+        _attach(self._frame, GL.GL_DEPTH_ATTACHMENT, self._depth)
 
     def bind(self) -> None:
         """Clear, and make the numbers go here."""
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._frame)
-        GL.glFramebufferTexture2D(
-            GL.GL_FRAMEBUFFER,
-            GL.GL_COLOR_ATTACHMENT0,
-            GL.GL_TEXTURE_2D_MULTISAMPLE,
-            self._texture,
-            0,
-        )
-        GL.glFramebufferRenderbuffer(
-            GL.GL_FRAMEBUFFER, GL.GL_DEPTH_ATTACHMENT, GL.GL_RENDERBUFFER, self._depth
-        )
         GL.glViewport(0, 0, *self._size)
         GL.glDisable(GL.GL_SCISSOR_TEST)
         GL.glDisable(GL.GL_BLEND)
@@ -115,9 +108,8 @@ class _IdTarget:
     def read(self, program: ShaderProgram) -> Integer[np.ndarray, " N"]:
         """The different numbers over all samples of all pixels; 0 is the background."""
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._plain_frame)
-        GL.glFramebufferRenderbuffer(
-            GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, GL.GL_RENDERBUFFER, self._plain
-        )
+        if not self._samples:
+            return self._numbers()
         GL.glDisable(GL.GL_DEPTH_TEST)
         GL.glDisable(GL.GL_CULL_FACE)
         GL.glActiveTexture(GL.GL_TEXTURE0)
@@ -129,12 +121,10 @@ class _IdTarget:
             program.set_uniform("sample_number", sample)
             GL.glBindVertexArray(program._vao_id)
             GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
-            numbers = np.zeros(self._size[::-1], dtype=np.uint32)
-            GL.glReadPixels(0, 0, *self._size, GL.GL_RED_INTEGER, GL.GL_UNSIGNED_INT, numbers)
-            found.append(np.unique(numbers))
+            found.append(self._numbers())
         GL.glBindVertexArray(0)
         program._unbind()
-        return np.unique(np.concatenate(found)).astype(np.int64)
+        return np.unique(np.concatenate(found))
 
     def delete(self) -> None:
         """Free the buffers."""
@@ -142,6 +132,23 @@ class _IdTarget:
         GL.glDeleteFramebuffers(2, [self._frame, self._plain_frame])
         GL.glDeleteRenderbuffers(2, [self._depth, self._plain])
         GL.glDeleteTextures([self._texture])
+
+    def _numbers(self) -> Integer[np.ndarray, " N"]:
+        numbers = np.zeros(self._size[::-1], dtype=np.uint32)
+        GL.glReadPixels(0, 0, *self._size, GL.GL_RED_INTEGER, GL.GL_UNSIGNED_INT, numbers)
+        return np.unique(numbers).astype(np.int64)
+
+
+def _renderbuffer(kind: int, samples: int, width: int, height: int) -> int:
+    buffer = int(GL.glGenRenderbuffers(1))
+    GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, buffer)
+    GL.glRenderbufferStorageMultisample(GL.GL_RENDERBUFFER, samples, kind, width, height)
+    return buffer
+
+
+def _attach(frame: int, point: int, buffer: int) -> None:
+    GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, frame)
+    GL.glFramebufferRenderbuffer(GL.GL_FRAMEBUFFER, point, GL.GL_RENDERBUFFER, buffer)
 
 
 def _program(programs: ShaderProgramCache, vertex: str, fragment: str) -> ShaderProgram:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -119,6 +121,15 @@ def make_rig(stage: Stage, settings: RenderSettings = SMALL) -> CameraRig:
 
 
 @pytest.fixture(scope="session")
+def synthetic() -> SimpleNamespace:
+    """The builders of this file, for tests that need their own room or body."""
+    return SimpleNamespace(
+        parts=make_room(), part=part, box=box, grid=grid, capsule_body=capsule_body, walk=walk,
+        make_stage=make_stage, make_rig=make_rig, room_size=ROOM_SIZE, small=SMALL, tiny=TINY,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
 def stage() -> Stage:
     return make_stage()
 
@@ -128,10 +139,10 @@ def rig(stage: Stage) -> CameraRig:
     return make_rig(stage)
 
 
-@pytest.fixture
-def release_context():
-    """Leave no context behind for the next test."""
+@pytest.fixture(scope="module", autouse=True)
+def free_the_context():
+    """Leave no context behind for the tests of other packages."""
+    yield
     from renderer import offscreen
 
-    yield
     offscreen.release()
