@@ -62,10 +62,13 @@ class Graph:
 def fit_scale(duels: Duels, count: int, *, link: Link = "logit", order: bool = False) -> Scale:
     """Maximum likelihood by Fisher scoring on pair counts; equals R's BradleyTerry2 and `glm`.
 
-    Raises `ValueError` when it does not converge, which `describe_graph` foresees (separation).
+    Raises `ValueError` when it does not converge, which `describe_graph` foresees (separation), and
+    when the order effect cannot be told from the abilities.
     """
     first, second, wins, answers = _ordered_pairs(duels, count)
     design = _design(first, second, count, order)
+    if np.linalg.matrix_rank(design) < design.shape[1]:
+        raise ValueError("the abilities and the order effect cannot be told apart")
     beta = np.zeros(design.shape[1])
     for _ in range(MAX_STEPS):
         gradient, information = _score(design, beta, wins, answers, link)
@@ -88,6 +91,26 @@ def fit_scale(duels: Duels, count: int, *, link: Link = "logit", order: bool = F
     )  # fmt: skip
 
 
+def fit_finite_scale(duels: Duels, count: int) -> tuple[Scale, list[str]]:
+    """A scale that always exists for a connected graph, and what had to be given up for it.
+
+    First with an order effect, then without, then with half an answer added on each side.
+    """
+    added = "separated choices: half an answer added on each side of every pair"
+    confounded = "the order effect cannot be estimated from these sides"
+    if not describe_graph(duels, count).separated:
+        for order, flags in ((True, []), (False, [confounded])):
+            try:
+                return fit_scale(duels, count, order=order), flags
+            except ValueError:
+                continue
+    finite = with_half_answers(duels)
+    try:
+        return fit_scale(finite, count, order=True), [added]
+    except ValueError:
+        return fit_scale(finite, count), [added, confounded]
+
+
 def clustered_covariance(
     duels: Duels, scale: Scale, clusters: Int[np.ndarray, "D"], *, link: Link = "logit"
 ) -> Float[np.ndarray, "K K"]:
@@ -104,7 +127,7 @@ def clustered_covariance(
         scores = np.column_stack([scores, np.bincount(clusters, slope, groups)])
     bread = np.linalg.inv(information)
     n, k = duels.answers.sum(), len(beta)
-    factor = groups / (groups - 1) * (n - 1) / (n - k)
+    factor = groups / (groups - 1) * (n - 1) / max(n - k, 1)
     middle = bread @ (scores.T @ scores) @ bread * factor
     full = np.zeros((count, count))
     full[1:, 1:] = middle[: count - 1, : count - 1]
@@ -114,7 +137,12 @@ def clustered_covariance(
 def two_way_covariance(
     duels: Duels, scale: Scale, people: Int[np.ndarray, "D"], stimuli: Int[np.ndarray, "D"]
 ) -> Float[np.ndarray, "K K"]:
-    """Participant x stimulus clustered covariance; negative eigenvalues are set to zero."""
+    """Participant x stimulus clustered covariance; negative eigenvalues are set to zero.
+
+    With a single participant or stimulus nothing can be clustered: that of independent answers.
+    """
+    if people.max() == 0 or stimuli.max() == 0:
+        return scale.covariance
     both = np.unique(
         people.astype(np.int64) * (int(stimuli.max()) + 1) + stimuli, return_inverse=True
     )[1]

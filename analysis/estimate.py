@@ -200,18 +200,18 @@ def _scale(analysed: Responses, found: list[Comparison]) -> dict[str, Any]:
             "star design: the scale repeats the preference rates; it has no goodness of fit, and "
             "transitivity is not measurable in this design"
         )
-    finite = duels
-    if graph.separated:
-        finite = scaling.with_half_answers(duels)
-        record["flags"].append("separated choices: half an answer added on each side of every pair")
-    fit = scaling.fit_scale(finite, len(names), order=True)
+    fit, flags = scaling.fit_finite_scale(duels, len(names))
+    if people.max() == 0 or stimuli.max() == 0:
+        flags = [*flags, "one participant or stimulus only: errors assume independent answers"]
+    record["flags"] += flags
     covariance = scaling.two_way_covariance(duels, fit, people, stimuli)
     ability, se = scaling.centred(fit, covariance)
     record["methods"] = [
         {"method": name, "ability": float(a), "se": float(s)}
         for name, a, s in sorted(zip(names, ability, se, strict=True), key=lambda row: -row[1])
     ]
-    record["order_effect"] = {"log_odds": fit.order, "se_independent": fit.order_se}
+    if fit.order is not None:
+        record["order_effect"] = {"log_odds": fit.order, "se_independent": fit.order_se}
     circular, complete = scaling.circular_triads(duels, len(names))
     record |= {"circular_triads": circular, "complete_triads": complete}
     if graph.lack_of_fit_df > 0 and not graph.separated:
