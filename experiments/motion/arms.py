@@ -17,8 +17,7 @@ from experiments.motion.figure import Figure
 from experiments.motion.rotations import (
     about,
     joint_positions,
-    slerp,
-    to_axis_angle,
+    steady_slerp,
     to_matrix,
     unit,
 )
@@ -28,6 +27,7 @@ _TRUNK_FOLLOW = 0.3
 """Share of the trunk's pitch that a hanging arm takes on: gravity keeps it near the vertical."""
 _RHYTHM_SHARE, _RHYTHM_FROM_DEG = 0.28, 40.0
 """Scapulohumeral rhythm: the collar rises with the arm once the arm is well up (Inman 1944)."""
+_SOFT_M = 0.03
 _RIDE_ALONG = 0.66
 _RIDE_ABOVE_M = 0.034
 _RIDE_INWARD_DEG = 12.0
@@ -94,8 +94,8 @@ def _target(
     fingers = about("z", yaw) @ about("x", -tilt)
     free_frame = _palm_frame(-fingers[..., 1], fingers[..., 2], side) @ about("x", sign * roll)
     ride = own["ride"]
-    frame = slerp(to_axis_angle(free_frame), to_axis_angle(thigh_frame), ride[:, 0])
-    return own["hand"] * (1 - ride) + on_thigh * ride, to_matrix(frame)
+    frame = steady_slerp(free_frame, thigh_frame, ride[:, 0])
+    return own["hand"] * (1 - ride) + on_thigh * ride, frame
 
 
 def _palm_frame(fingers: Path, back: Path, side: str) -> Frames:
@@ -137,7 +137,7 @@ def _reaching(
     sign = 1.0 if side == "left" else -1.0
     pole = np.stack([sign * np.sin(swivel), -np.cos(swivel), np.full(len(swivel), -0.25)], axis=-1)
     pole = (base @ pole[..., None])[..., 0]
-    elbow, wrist = middle_joint(shoulder, target, pole, figure.arm, reach=0.995)
+    elbow, wrist = middle_joint(shoulder, target, pole, figure.arm, _SOFT_M)
     upper, fore = unit(elbow - shoulder), unit(wrist - elbow)
     hinge = unit(np.cross(upper, fore))
     return _Arm(_bone_frame(upper, hinge, side), _bone_frame(fore, hinge, side))
@@ -154,12 +154,9 @@ def _mix(
     """From hanging (0) to reaching (1): upper arm in the chest's frame, forearm about the elbow."""
     share = np.clip(own["reach"][:, 0], 0.0, 1.0)
     inverse = np.swapaxes(base, -1, -2)
-    start, end = (to_axis_angle(inverse @ arm.upper) for arm in (hanging, reaching))
-    upper = base @ to_matrix(slerp(start, end, share))
-    start, end = (
-        to_axis_angle(np.swapaxes(arm.upper, -1, -2) @ arm.fore) for arm in (hanging, reaching)
-    )
-    return _Arm(upper, upper @ to_matrix(slerp(start, end, share)))
+    upper = base @ steady_slerp(inverse @ hanging.upper, inverse @ reaching.upper, share)
+    bent = [np.swapaxes(arm.upper, -1, -2) @ arm.fore for arm in (hanging, reaching)]
+    return _Arm(upper, upper @ steady_slerp(bent[0], bent[1], share))
 
 
 def _raise_collar(world: Float[np.ndarray, "T 22 3 3"], arm: _Arm, side: str) -> None:
@@ -181,7 +178,7 @@ def _hand(
     by_angles = about("x", own["pronation"][:, 0]) @ about("z", sign * own["wrist"][:, 0])
     laid = np.swapaxes(fore, -1, -2) @ palm_frame
     palm = np.clip((np.maximum(own["palm"], own["ride"]) * own["reach"])[:, 0], 0.0, 1.0)
-    local = to_matrix(slerp(to_axis_angle(by_angles), to_axis_angle(laid), palm))
+    local = steady_slerp(by_angles, laid, palm)
     twist = _twist_about_x(local)
     return fore @ about("x", 0.5 * twist), fore @ local
 

@@ -60,6 +60,12 @@ class Figure:
         return self.ankle_height + _STRAIGHT * sum(self.leg)
 
     @property
+    def shoulder_height(self) -> float:
+        """Height of the shoulder joints of a relaxed standing person."""
+        above = self.rest_joints[INDEX["left_shoulder"]] - self.rest_joints[INDEX["left_hip"]]
+        return self.hip_height + float(above[1])
+
+    @property
     def hip_half_width(self) -> float:
         """Half the distance between the hip joints."""
         left, right = self.rest_joints[INDEX["left_hip"]], self.rest_joints[INDEX["right_hip"]]

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 from jaxtyping import Float, Integer
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from experiments.motion.figure import Figure, surface
 from experiments.motion.motion import Motion
@@ -16,17 +16,24 @@ _EVERY = 8
 """Of the whole skin every eighth vertex tells the lowest point to a few millimetres."""
 
 
-def ground(motion: Motion, figure: Figure, whole_body: bool = False) -> Motion:
-    """Shift the root up or down so that the lowest point rests on the floor in every frame.
+def ground(motion: Motion, figure: Figure) -> Motion:
+    """Shift the root up or down so that the lowest sole point rests on the floor in every frame.
 
-    The lowest sole point, or with `whole_body` the lowest of all the skin (lying and rolling).
     The shift is smoothed, so that a flight phase is not pulled down at once.
     """
-    ids = figure.body.body_component[::_EVERY] if whole_body else np.concatenate(figure.soles)
-    lowest = lowest_height(motion, figure, ids)
-    shift = np.zeros_like(motion.transl)
-    shift[:, 2] = -gaussian_filter1d(lowest, _SIGMA_FRAMES, mode="nearest")
-    return dataclasses.replace(motion, transl=motion.transl + shift)
+    lowest = lowest_height(motion, figure, np.concatenate(figure.soles))
+    return _raised(motion, -gaussian_filter1d(lowest, _SIGMA_FRAMES, mode="nearest"))
+
+
+def rest_on_floor(motion: Motion, figure: Figure) -> Motion:
+    """The same for lying and rolling: whatever is lowest of all the skin rests on the floor.
+
+    The shift is a smooth curve that never leaves anything below the floor, at the price of floating by
+    some millimetres between.
+    """
+    lowest = lowest_height(motion, figure, figure.body.body_component[::_EVERY])
+    above = maximum_filter1d(-lowest, 7, mode="nearest")
+    return _raised(motion, gaussian_filter1d(above, 2.0, mode="nearest", truncate=1.5))
 
 
 def lowest_height(
@@ -34,3 +41,8 @@ def lowest_height(
 ) -> Float[np.ndarray, " T"]:
     """Height (m) of the lowest of these vertices in every frame."""
     return np.asarray(surface(figure, motion, ids)[..., 2].min(axis=1))
+
+
+def _raised(motion: Motion, shift: Float[np.ndarray, " T"]) -> Motion:
+    transl = motion.transl + shift[:, None] * np.array([0.0, 0.0, 1.0])
+    return dataclasses.replace(motion, transl=transl)

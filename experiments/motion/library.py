@@ -121,6 +121,8 @@ _DEFAULT: tuple[MotionSpec, ...] = (
                recipes.bend_pick, 2.2, ("objects", "floor"), None, 0.22),
     MotionSpec("reach_high", "reach for a high shelf", AUTHORED,
                recipes.reach_high, 2.3, ("shelving", "cabinet", "floor"), None, 1.80),
+    MotionSpec("floor_get_up", "get up from the floor", f"DeepMimic clip of the package pybullet; {AUTHORED}",
+               recipes.floor_get_up, 2.0),
     MotionSpec("step_aside", "step aside and back", AUTHORED, recipes.step_aside, 2.4),
     MotionSpec("walk_around", "walk round something and on", f"{STEPS}; {AUTHORED}",
                recipes.walk_around, 4.0),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from experiments.motion.phrases_sit import Seat
 from experiments.motion.score import Score, Value
 
@@ -75,12 +73,15 @@ def _keys(
     down = (x + 0.06, y + 0.34, bed.height + figure.back_offset - _MATTRESS_M)
     legs = 0.985 * sum(figure.leg)
     side_hand = (x + 0.40, y + 0.10, bed.height + 0.035)
+    lifted = (side_hand[0] + 0.05, y - 0.10, bed.height + 0.12)
     beside = (down[0] - 0.03, down[1] - 0.33, bed.height + 0.05)
     belly = (down[0] + 0.14, down[1] + 0.07, down[2] + figure.belly_front + 0.035)
     over_belly = (down[0] + 0.02, down[1] + 0.16, belly[2] + 0.12)
     keys: dict[str, list[tuple[float, Value]]] = {
-        "hip": [(0.0, (x, y, z)), (0.55, (x + 0.015, y, z + 0.004)), (1.25, (x + 0.05, y + 0.10, z + 0.03)),
-                (1.9, (x + 0.065, y + 0.25, z + 0.03)), (2.6, (down[0], down[1], down[2] + 0.006)), (3.1, down)],
+        "hip": [(0.0, (x, y, z)), (0.55, (x + 0.015, y, z + 0.004)),
+                (1.25, (x + 0.05, y + 0.10, z + 0.03)),
+                (1.9, (x + 0.065, y + 0.25, z + 0.03)),
+                (2.6, (down[0], down[1], down[2] + 0.006)), (3.1, down)],
         "yaw": [(0.0, 0.0), (0.45, -5.0), (1.15, -42.0), (1.75, -78.0), (2.3, -90.0)],
         "pitch": [(0.0, -bed.recline), (0.45, -3.0), (1.1, -24.0), (1.75, -58.0), (2.4, -86.0), (2.9, -91.0)],
         "roll": [(0.0, 0.3), (0.75, 13.0), (1.35, 12.0), (2.1, 1.0), (2.6, 0.0)],
@@ -91,11 +92,14 @@ def _keys(
         "head_free": [(0.0, 0.0), (0.55, 0.0), (1.5, 1.0)],
         "head_flex": [(0.0, 0.0), (1.2, 14.0), (2.0, 22.0), (2.9, 12.0)],
         "left_reach": [(0.0, 1.0), (3.0, 1.0)],
-        "left_ride": [(0.0, 1.0), (0.1, 1.0), (0.6, 0.0)],
-        "left_palm": [(0.0, 0.0), (0.6, 1.0), (1.5, 1.0), (2.3, 0.7)],
-        "left_palm_frame": [(0.0, (60.0, 0.0, 0.0)), (1.5, (40.0, 0.0, 0.0)), (2.4, (-80.0, 0.0, 10.0))],
-        "left_hand": [(0.0, side_hand), (1.45, side_hand), (1.85, (side_hand[0] + 0.05, y - 0.10, bed.height + 0.12)),
-                      (2.5, beside)],
+        "left_ride": [(0.0, 1.0), (0.05, 1.0), (0.60, 0.0)],
+        "left_palm": [(0.0, 0.0), (0.4, 0.0), (1.0, 1.0), (1.35, 1.0), (1.9, 0.0),
+                      (2.2, 0.0), (3.0, 0.6)],
+        "left_wrist": [(0.0, 4.0), (0.7, 52.0), (1.4, 50.0), (2.3, 6.0)],
+        "left_pronation": [(0.0, 24.0), (0.7, 75.0), (1.6, 70.0), (2.4, 60.0)],
+        "left_palm_frame": [(0.0, (60.0, 0.0, 0.0)), (1.4, (40.0, 0.0, 0.0)), (1.95, (40.0, 0.0, 0.0)),
+                            (2.15, (-80.0, 0.0, 10.0))],
+        "left_hand": [(0.0, side_hand), (1.45, side_hand), (1.85, lifted), (2.5, beside)],
         "left_swivel": [(0.0, 30.0), (1.0, 50.0), (2.2, 60.0)],
         "right_ride": [(0.0, 1.0), (1.0, 1.0), (1.9, 0.0)],
         "right_palm": [(0.0, 0.0), (1.9, 0.3), (2.6, 1.0)],
@@ -124,13 +128,9 @@ def _foot_keys(
     return {
         f"{side}_foot": [(0.0, foot), (0.62 + lag, foot), (1.25 + lag, lift), (1.75 + lag, over),
                          (2.35 + lag, (goal[0] + 0.04, goal[1], goal[2] + 0.05)), (2.8 + lag, goal)],
-        f"{side}_toe_out": [(0.0, sign * 8.0), (0.7 + lag, sign * 8.0), (2.2 + lag, -90.0 + sign * 14.0)],
-        f"{side}_heel": [(0.0, 0.0), (0.62 + lag, 0.0), (0.9 + lag, 14.0), (1.3 + lag, 0.0), (2.0 + lag, -38.0),
-                         (2.8 + lag, -62.0)],
+        f"{side}_toe_out": [(0.0, sign * 8.0), (0.7 + lag, sign * 8.0),
+                            (2.2 + lag, -90.0 + sign * 14.0)],
+        f"{side}_heel": [(0.0, 0.0), (0.62 + lag, 0.0), (0.9 + lag, 14.0), (1.3 + lag, 0.0),
+                         (2.0 + lag, -38.0), (2.8 + lag, -62.0)],
         f"{side}_splay": [(0.0, 11.0), (1.6, 4.0), (2.8, 6.0)],
     }  # fmt: skip
-
-
-def head_height(score: Score, bed: Seat) -> float:
-    """Height of the hip centre when lying (m): where the pillow's job begins."""
-    return float(np.round(bed.height + score.figure.back_offset - _MATTRESS_M, 6))

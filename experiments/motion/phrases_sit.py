@@ -174,7 +174,7 @@ def gather_hands(score: Score) -> None:
 
 def work_at_table(score: Score, height: float, seconds: float, rng: np.random.Generator) -> None:
     """Seated: hands to a table top, type, look up to one side, type, sit back."""
-    x, y, _ = score.last("hip")
+    y = score.last("hip")[1]
     front, t = y - 0.41, seconds
     score.put("gaze", (0.4, (30.0, 3.0)), (0.30 * t, (33.0, -4.0)), (0.36 * t, (8.0, 20.0)),
               (0.48 * t, (6.0, 24.0)), (0.54 * t, (32.0, 2.0)), (0.76 * t, (34.0, -2.0)),

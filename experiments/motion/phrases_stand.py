@@ -52,8 +52,9 @@ def reach_for(
     sign = 1.0 if hand == "left" else -1.0
     other = "right" if hand == "left" else "left"
     x, y, z = score.last("hip")
-    goal = (0.13 * sign, y - distance, height)
-    near = (0.20 * sign, y - 0.66 * distance, height - 0.12)
+    goal = ((0.13 + 0.10 * max(0.0, height - 1.45)) * sign, y - distance, height)
+    chest = score.figure.shoulder_height - 0.12
+    near = (0.22 * sign, y - max(0.66 * distance, 0.38), min(height - 0.12, chest))
     up = max(0.0, height - 1.45)
     # On the toes the ankles rise by the way from toe joint to ankle times the sine of the lift.
     rise = float(np.sin(np.radians(tiptoe))) * float(np.linalg.norm(score.figure.ball[1:]))
@@ -76,12 +77,12 @@ def reach_for(
     score.put(f"{hand}_protract", (0.35, 0.0), (1.05, 13.0), (back, 14.0), (back + 0.8, 0.0))
     score.put(f"{hand}_shrug", (0.4, 0.0), (1.0, 4.0), (back, 4.0), (back + 0.9, 0.0))
     score.start(f"{hand}_hand", *near)
-    score.put(f"{hand}_hand", (0.75, near), (1.15, goal), (back, goal), (back + 0.45, near))
+    score.put(f"{hand}_hand", (0.7, near), (1.2, goal), (back, goal), (back + 0.5, near))
     score.put(f"{hand}_reach", (0.28, 0.0), (0.95, 1.0), (back + 0.25, 1.0), (back + 1.15, 0.0))
     score.put(f"{hand}_pronation", (0.4, 24.0), (1.1, 45.0), (back, 45.0), (back + 1.1, 24.0))
     score.put(f"{hand}_wrist", (0.35, 4.0), (0.75, -10.0), (1.15, 10.0), (back, 8.0), (back + 0.5, -8.0),
               (back + 1.2, 4.0))  # fmt: skip
-    score.put(f"{hand}_swivel", (0.4, 24.0), (1.1, 34.0), (back + 0.8, 24.0))
+    score.put(f"{hand}_swivel", (0.4, 24.0), (1.1, 34.0 - 50.0 * up), (back + 0.8, 24.0))
     score.put(f"{other}_hang", (0.4, (9.0, 3.0, 17.0, 18.0)), (1.15, (13.0, -9.0, 22.0, 18.0)),
               (back + 0.2, (13.0, -8.0, 22.0, 18.0)), (back + 1.3, (8.5, 5.0, 16.0, 18.0)),
               (back + 1.8, (9.0, 3.0, 17.0, 18.0)))  # fmt: skip
@@ -137,14 +138,15 @@ def pick_up(score: Score, height: float, hand: str = "right") -> None:
     low = z - 0.16 - 0.14 * deep
     goal = (0.07 * sign, y - 0.44, height)
     near = (0.16 * sign, y - 0.40, height + 0.14)
-    held = (0.16 * sign, y - 0.36, z + 0.10)
+    held = (0.15 * sign, y - 0.29, z + 0.20)
+    lifted = (0.14 * sign, y - 0.36, 0.55 * z + 0.5 * height)
     score.put("gaze", (0.35, (42.0, 3.0 * sign)), (1.6, (52.0, 2.0 * sign)), (2.3, (44.0, 4.0 * sign)),
               (3.0, (36.0, 8.0 * sign)), (4.2, (34.0, 7.0 * sign)), (5.0, (6.0, 0.0)))  # fmt: skip
     score.put("hip", (0.3, (x, y + 0.01, z - 0.01)), (0.85, (x, y + 0.13, 0.45 * z + 0.55 * low)),
               (1.45, (x - 0.015 * sign, y + 0.15, low)), (1.75, (x - 0.015 * sign, y + 0.15, low)),
               (2.3, (x, y + 0.09, 0.5 * z + 0.5 * low)), (3.0, (x, y, z)))  # fmt: skip
-    score.put("pitch", (0.25, 3.0), (0.95, 30.0), (1.5, 44.0 + 8.0 * deep), (1.8, 44.0 + 8.0 * deep), (2.4, 26.0),
-              (3.1, 2.0))  # fmt: skip
+    score.put("pitch", (0.25, 3.0), (0.95, 30.0), (1.5, 44.0 + 8.0 * deep), (1.8, 44.0 + 8.0 * deep),
+              (2.4, 26.0), (3.1, 2.0))  # fmt: skip
     score.put(
         "flex",
         (0.35, 6.0),
@@ -163,9 +165,9 @@ def pick_up(score: Score, height: float, hand: str = "right") -> None:
         (1.1, near),
         (1.5, goal),
         (1.82, goal),
-        (2.25, near),
-        (2.95, held),
-        (4.0, held),
+        (2.45, lifted),
+        (3.25, held),
+        (4.1, held),
     )
     score.put(f"{hand}_reach", (0.55, 0.0), (1.25, 1.0), (4.0, 1.0), (4.9, 0.0))
     score.put(
@@ -180,7 +182,8 @@ def pick_up(score: Score, height: float, hand: str = "right") -> None:
     score.put(f"{hand}_wrist", (0.8, 0.0), (1.4, 14.0), (1.8, -6.0), (2.9, -8.0), (4.6, 4.0))
     score.put(f"{hand}_protract", (0.8, 0.0), (1.5, 10.0), (2.6, 0.0))
     score.put(f"{other}_hang", (0.7, (12.0, 8.0, 22.0, 20.0)), (1.5, (15.0, 16.0, 34.0, 26.0)),
-              (2.3, (11.0, 4.0, 22.0, 18.0)), (3.1, (8.5, 0.0, 14.0, 18.0)), (3.9, (9.0, 3.0, 17.0, 18.0)))  # fmt: skip
+              (2.3, (11.0, 4.0, 22.0, 18.0)), (3.1, (8.5, 0.0, 14.0, 18.0)),
+              (3.9, (9.0, 3.0, 17.0, 18.0)))  # fmt: skip
     score.both("splay", (1.3, 13.0), (1.8, 13.0), (2.9, 3.0), lag=0.06)
     score.both("heel", (0.9, 0.0), (1.5, 7.0 * deep), (1.8, 7.0 * deep), (2.5, 0.0), lag=0.05)
     score.wait(5.1)

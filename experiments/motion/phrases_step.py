@@ -33,6 +33,12 @@ def step(
     middle = (stand + goal) / 2 + ahead
     score.put("hip", (0.42 * t, (*over, height - 0.012)), (1.12 * t, (*middle, height)))
     lean = 1.0 if side == "left" else -1.0
+    score.put(
+        f"{other}_hang", (0.5 * t, (11.0, 7.0, 21.0, 18.0)), (1.12 * t, (9.0, 3.0, 17.0, 18.0))
+    )
+    score.put(
+        f"{side}_hang", (0.55 * t, (12.0, -2.0, 17.0, 18.0)), (1.12 * t, (9.0, 3.0, 17.0, 18.0))
+    )
     score.put("roll", (0.45 * t, -2.2 * lean), (1.1 * t, 0.0))
     score.wait(1.12 * t)
 

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
+from experiments.motion.compose import join
+from experiments.motion.deepmimic import pybullet_clip, read_deepmimic
 from experiments.motion.figure import Figure
+from experiments.motion.foot_lock import lock_feet
 from experiments.motion.gait import (
     MIRRORED_WALK,
     STEP_LEFT,
@@ -14,6 +19,7 @@ from experiments.motion.gait import (
     gait,
     walk_within,
 )
+from experiments.motion.ground import rest_on_floor
 from experiments.motion.motion import Motion
 from experiments.motion.perform import perform
 from experiments.motion.phrases_lie import get_up, lie_down, rest
@@ -37,8 +43,12 @@ from experiments.motion.phrases_stand import (
     shift_weight,
 )
 from experiments.motion.phrases_step import step, turn_to
-from experiments.motion.resample import window
+from experiments.motion.resample import low_pass, resample, window
+from experiments.motion.retarget import retarget
 from experiments.motion.score import Score
+
+FLOOR_GET_UP = "humanoid3d_getup_facedown"
+_UNHURRIED = 1.25
 
 
 def walk_straight(figure: Figure) -> Motion:
@@ -136,7 +146,7 @@ def reach_high(figure: Figure) -> Motion:
     """Reach for a high shelf on tiptoe."""
     score = Score(figure)
     score.wait(0.6)
-    reach_for(score, 1.08 * figure.hip_height + 0.78, 0.46, 1.0, "left", tiptoe=16.0)
+    reach_for(score, figure.shoulder_height + 0.43, 0.52, 1.0, "left", tiptoe=16.0)
     score.wait(0.7)
     return perform(score, "", 35)
 
@@ -194,3 +204,15 @@ def _walk_and_stop(figure: Figure, clips: tuple[str, ...], seed: int) -> Motion:
     score = Score(figure)
     score.wait(2.0)
     return walk_within(perform(score, "", seed), gait(figure, clips), figure, 0.7)
+
+
+def floor_get_up(figure: Figure) -> Motion:
+    """Push up from lying on the floor, get up, stand and look about."""
+    score = Score(figure)
+    score.wait(0.4)
+    look_about(score, 3.0)
+    standing = perform(score, "", 41)
+    recorded = low_pass(retarget(read_deepmimic(pybullet_clip(FLOOR_GET_UP)), figure))
+    # The performer springs up; at four fifths of the pace it is an everyday movement.
+    rising = resample(dataclasses.replace(recorded, times=recorded.times * _UNHURRIED))
+    return lock_feet(rest_on_floor(join(rising, standing, figure, 10, 18), figure), figure, 0.5)

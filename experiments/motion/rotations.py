@@ -51,6 +51,26 @@ def slerp(
     return to_axis_angle(first @ to_matrix(arc * share[..., None]))
 
 
+def steady_slerp(
+    start: Float[np.ndarray, "T 3 3"],
+    end: Float[np.ndarray, "T 3 3"],
+    share: Float[np.ndarray, " T"],
+) -> Float[np.ndarray, "T 3 3"]:
+    """Rotations between two moving ones, continuous over time.
+
+    The shortest arc flips where the two come to differ by half a turn; here the arc of each frame is
+    the one nearest to that of the frame before.
+    """
+    arc = to_axis_angle(np.swapaxes(start, -1, -2) @ end)
+    for frame in range(1, len(arc)):
+        angle = float(np.linalg.norm(arc[frame]))
+        other = arc[frame] * (1 - 2 * np.pi / max(angle, 1e-9))
+        before = arc[frame - 1]
+        if np.linalg.norm(other - before) < np.linalg.norm(arc[frame] - before):
+            arc[frame] = other
+    return np.asarray(start @ to_matrix(arc * share[:, None]))
+
+
 def about(axis: str, degrees: Float[np.ndarray, " T"] | float) -> Float[np.ndarray, "*T 3 3"]:
     """Rotation matrices about a coordinate axis, degrees in, one matrix for a number."""
     angles = np.atleast_1d(np.asarray(degrees, dtype=np.float64))

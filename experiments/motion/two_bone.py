@@ -13,20 +13,32 @@ def middle_joint(
     target: Float[np.ndarray, "T 3"],
     pole: Float[np.ndarray, "T 3"],
     lengths: tuple[float, float],
-    reach: float = 0.9995,
+    soft_m: float = 0.0,
 ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
     """Positions of knee (elbow) and ankle (wrist) when the limb bends towards `pole`.
 
-    The law of cosines; a target beyond `reach` of the limb's length is approached as near as that.
+    The law of cosines. A target out of reach is approached as near as the limb goes; with `soft_m` the
+    limb begins to give that much before it is straight, so that the elbow never snaps.
     """
     first, second = lengths
     axis = unit(target - start)
     distance = np.linalg.norm(target - start, axis=-1, keepdims=True)
-    distance = np.clip(distance, abs(first - second) * 1.001 + 1e-6, (first + second) * reach)
+    distance = np.maximum(_within_reach(distance, first + second, soft_m), 1e-6)
+    distance = np.maximum(distance, abs(first - second) * 1.001)
     along = (first**2 - second**2 + distance**2) / (2 * distance)
     aside = np.sqrt(np.maximum(first**2 - along**2, 0.0))
     bend = unit(pole - np.sum(pole * axis, axis=-1, keepdims=True) * axis)
-    return start + along * axis + aside * bend, start + distance * axis
+    return np.asarray(start + along * axis + aside * bend), np.asarray(start + distance * axis)
+
+
+def _within_reach(
+    distance: Float[np.ndarray, "T 1"], length: float, soft_m: float
+) -> Float[np.ndarray, "T 1"]:
+    longest = 0.9995 * length
+    if soft_m == 0:
+        return np.asarray(np.minimum(distance, longest))
+    excess = np.maximum(distance - (longest - soft_m), 0.0)
+    return np.asarray(distance - excess + soft_m * (1 - np.exp(-excess / soft_m)))
 
 
 def move_end(
