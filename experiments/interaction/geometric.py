@@ -27,11 +27,13 @@ SOLE_SPEED = 0.45
 """A foot faster than this, m/s, is swinging."""
 SUPPORT_THICKNESS_M = 0.03
 """Seat and back vertices this close above the lowest of their region touch."""
+PALM_THICKNESS_M = 0.015
+"""Palm vertices this close behind the foremost of their palm touch."""
 HOLD_S = 0.25
 """Sitting, lying and touching shorter than this are passing postures."""
 CERTAIN = 10.0
 """Score of the class of a vertex where all others score 0: a softmax of it is nearly one-hot."""
-MAX_MAPS = 8
+MAX_MAPS = 4
 """At most this many feature maps are offered."""
 
 _SEATS = {"chair": 0.45, "sofa": 0.43, "bed": 0.52, "seating": 0.46, "stool": 0.46, "toilet": 0.42}
@@ -154,8 +156,11 @@ def palm_touch(moving: MovingBody, side: str, floor: float) -> Bool[np.ndarray, 
     speed = gaussian_filter1d(moving.speed(hand), 2.0)
     still = _held((reach > 0.28) & (height > 0.45) & (height < 1.75) & (speed < 0.15), moving.times)
     columns = moving.columns[f"{side}_palm"]
-    facing = moving.normals[:, columns].mean(1, keepdims=True)
-    flat = (moving.normals[:, columns] * _unit(facing)).sum(-1) > 0.7
+    facing = _unit(moving.normals[:, columns].mean(1, keepdims=True))
+    flat = (moving.normals[:, columns] * facing).sum(-1) > 0.7
+    # Fingers curl: only the foremost layer of a palm can lie on one surface.
+    ahead_of_palm = (moving.vertices[:, columns] * facing).sum(-1)
+    flat &= ahead_of_palm > ahead_of_palm.max(1, keepdims=True) - PALM_THICKNESS_M
     touching = np.zeros(moving.vertices.shape[:2], dtype=bool)
     touching[:, columns] = flat & still[:, None]
     return touching

@@ -46,7 +46,7 @@ class PlacementSettings:
     max_depth: float | None = 0.20
     """Reject a fit where a vertex without contact is deeper than this inside something,
     metres (ours); None keeps all."""
-    max_gap: float | None = 0.06
+    max_gap: float | None = 0.12
     """Reject a fit whose contacts with anything but floor are further than this from the scene on
     average, metres (ours): hands that lean on air. None keeps all."""
     coarse_frames: int = 20
