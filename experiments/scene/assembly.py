@@ -18,7 +18,7 @@ from renderer.files import atomic_path
 
 CELL = 0.025
 THICKNESS = 0.01
-_ALGORITHM = "volumes-5"
+_ALGORITHM = "volumes-6"
 """Named in the cache key: change it whenever the same input gives other volumes."""
 
 

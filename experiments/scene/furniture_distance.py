@@ -134,6 +134,9 @@ class _Field:
         """
         inside = inside_nodes(corners, self.distance, self.low, self.cell, closed)
         outer = np.flatnonzero(self._outer(inside, first, corners, closed) & ~hidden)
+        if not len(outer):
+            # A flat picture on its wall: all of it lies there, and it is as thick as it is.
+            outer = np.arange(len(corners))
         windows = Windows(self.low[None], np.array([inside.shape]))
         owner = np.zeros(len(outer), dtype=np.int64)
         band = BAND_CELLS * self.cell

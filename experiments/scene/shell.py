@@ -168,7 +168,7 @@ def _between_doors(length: float, openings: Sequence[Opening]) -> list[Interval]
 
 
 def _covers(opening: Opening, u: float, z: float) -> bool:
-    return opening.u0 < u < opening.u1 and opening.z0 < z < opening.z1
+    return bool(opening.u0 < u < opening.u1 and opening.z0 < z < opening.z1)
 
 
 def _lines(start: float, end: float, extra: Sequence[float] = ()) -> Float[np.ndarray, " N"]:

@@ -24,7 +24,7 @@ def floor_texture(kind: str, tint: Colour, seed: int = 0) -> UInt8[np.ndarray, "
 def paint_texture(colour: Colour, seed: int = 0) -> UInt8[np.ndarray, "s s 3"]:
     """Wall paint: the colour with the faint unevenness of a roller."""
     rng = np.random.default_rng([seed, 2])
-    return _coloured(1 + 0.008 * _noise(rng, 24, 24) + 0.006 * _noise(rng, 1.2, 1.2), colour)
+    return _coloured(1 + 0.005 * _noise(rng, 24.0, 24.0) + 0.006 * _noise(rng, 1.2, 1.2), colour)
 
 
 def _wood(rng: np.random.Generator) -> Float[np.ndarray, "s s 3"]:
@@ -39,7 +39,9 @@ def _wood(rng: np.random.Generator) -> Float[np.ndarray, "s s 3"]:
     warm = rng.uniform(-0.02, 0.02, rows * per_row)[board]
     # Every board is cut from another place of the same endless grain.
     grain = (
-        0.030 * _noise(rng, 90, 1.6) + 0.022 * _noise(rng, 30, 3.0) + 0.012 * _noise(rng, 8, 0.7)
+        0.030 * _noise(rng, 90.0, 1.6)
+        + 0.022 * _noise(rng, 30.0, 3.0)
+        + 0.012 * _noise(rng, 8.0, 0.7)
     )
     offset = rng.integers(0, PIXELS, rows * per_row)[board]
     grain = grain[(y + 7 * board) % PIXELS, (x + offset) % PIXELS]
@@ -58,14 +60,14 @@ def _tile(rng: np.random.Generator) -> Image:
     shade = rng.uniform(-0.02, 0.02, (count, count))[y // side, x // side]
     chequer = 0.07 * ((y // side + x // side) % 2)
     grout = np.maximum(_joint(y % side), _joint(x % side))
-    surface = 1 - chequer + shade + 0.010 * _noise(rng, 12, 12)
+    surface = 1 - chequer + shade + 0.010 * _noise(rng, 12.0, 12.0)
     light: Image = surface * (1 - 0.14 * grout)
     return light
 
 
 def _carpet(rng: np.random.Generator) -> Image:
     """Short pile: two scales of unevenness."""
-    return 1 + 0.022 * _noise(rng, 16, 16) + 0.035 * _noise(rng, 0.8, 0.8)
+    return 1 + 0.022 * _noise(rng, 16.0, 16.0) + 0.035 * _noise(rng, 0.8, 0.8)
 
 
 def _joint(place: np.ndarray) -> Float[np.ndarray, "..."]:
