@@ -8,6 +8,7 @@ participants answer over HTTP.
 from __future__ import annotations
 
 import json
+import math
 import os
 import socket
 import subprocess
@@ -26,6 +27,7 @@ from renderer.files import InputError, file_sha256, read_json, value_sha256, wri
 CONFIGS = Path(__file__).resolve().parent / "experiments" / "configs"
 PARTICIPANTS = 16
 SEED = 11
+TARGET = "pace"
 
 
 @click.command()
@@ -67,7 +69,7 @@ class DemoRun:
     @property
     def database_url(self) -> str:
         """The same as an SQLAlchemy address."""
-        return f"sqlite:///{self.database.resolve()}"
+        return f"sqlite:///{self.database}"
 
     @property
     def answers(self) -> Path:
@@ -91,12 +93,13 @@ class DemoRun:
 def run_demo(run: DemoRun) -> dict[str, Any]:
     """Run every stage that is not done yet; returns what `--json` prints."""
     begin = time.perf_counter()
-    with run.stage("place and render"):
-        build_stimuli(run)
+    build_stimuli(run)
     with run.stage("ask simulated participants"):
         truth = ask(run)
     with run.stage("analyse"):
-        call("analyze", str(run.answers), "--out", str(run.results))
+        call(
+            "analyze", str(run.answers), "--out", str(run.results), "--catalogue", str(run.stimuli)
+        )
     run.seconds["all"] = round(time.perf_counter() - begin, 1)
     return {
         "catalogue": str(run.stimuli / "catalogue.json"),
@@ -109,12 +112,19 @@ def run_demo(run: DemoRun) -> dict[str, Any]:
 
 
 def build_stimuli(run: DemoRun) -> None:
-    """Build the stimulus set with progress bars."""
+    """Build the stimulus set with progress bars, and note how long each of its stages took."""
     from experiments.cli import progress_bars
     from experiments.config import read_config
     from experiments.pipeline import build_set
 
-    with progress_bars(f"pace-study demo --out {run.out}") as progress:
+    begun: dict[str, float] = {}
+    with progress_bars(f"pace-study demo --out {run.out}") as bars:
+
+        def progress(stage: str, done: int, total: int) -> None:
+            bars(stage, done, total)
+            now = time.perf_counter()
+            run.seconds[stage] = round(now - begun.setdefault(stage, now), 1)
+
         build_set(read_config(run.set_config), run.stimuli, run.jobs, progress)
 
 
@@ -206,13 +216,28 @@ def call(*arguments: str) -> dict[str, Any]:
     return answer
 
 
+def truth_lines(truth: dict[str, Any]) -> str:
+    """What the simulated participants were told to prefer: worths drawn from the seed alone."""
+    worths = truth["methods"]
+    target, *baselines = sorted(worths, key=lambda name: name != TARGET)
+    rates = [
+        f"{100 / (1 + math.exp(worths[name] - worths[target])):.1f} % over {name}"
+        for name in baselines
+    ]
+    return (
+        f"SIMULATED answers. Their truth was drawn from seed {truth['seed']}, from no score and no name: "
+        f"{target} preferred {', '.join(rates)};\n"
+        f"side bias {truth['side_bias']:+.2f} (log odds), lapse rate {truth['lapse']:.2f}, "
+        f"spread between persons {truth['person_sd']:.2f}."
+    )
+
+
 def report(run: DemoRun, outcome: dict[str, Any]) -> str:
     """Both tables, where everything lies, and how to serve the study for real."""
     from analysis.tables import terminal_table
     from experiments.evaluate import plausibility_table, read_evaluation
 
     seconds = "  ".join(f"{name} {value:.0f} s" for name, value in outcome["seconds"].items())
-    worths = "  ".join(f"{name} {value}" for name, value in sorted(outcome["truth"].items()))
     database = run.database_url
     return "\n".join(
         [
@@ -221,7 +246,7 @@ def report(run: DemoRun, outcome: dict[str, Any]) -> str:
             plausibility_table(read_evaluation(run.stimuli)),
             "",
             terminal_table(read_json(run.results / "results.json")),
-            f"SIMULATED answers; their truth, drawn from seed {SEED}: {worths}",
+            truth_lines(outcome["truth"]),
             "",
             f"clips      {run.stimuli}/clips (catalogue.json beside them)",
             f"answers    {run.answers} (codebook.json beside it)",
@@ -230,6 +255,7 @@ def report(run: DemoRun, outcome: dict[str, Any]) -> str:
             f"seconds    {seconds}",
             "",
             "Ask real people:",
+            "  (edit a copy of experiments/configs/demo-study.toml: study_id, texts, number of trials)",
             f"  .venv/bin/pace-study study create STUDY.toml --catalogue {run.stimuli} --database {database}",
             f"  .venv/bin/pace-study study open STUDY_ID --database {database}",
             f"  .venv/bin/pace-study serve --database {database} --port 8000",

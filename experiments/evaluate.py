@@ -94,7 +94,7 @@ def plausibility_table(evaluation: dict[str, Any]) -> str:
     for name, means in evaluation["methods"].items():
         cells = [METHODS[name].display_name, str(means["clips"])]
         for score, _, decimals in COLUMNS:
-            cells.append(f"{means[score]:.{decimals}f}" if score in means else "-")
+            cells.append(_shown(means[score], decimals) if score in means else "-")
         lines.append(cells)
     widths = [max(len(row[i]) for row in [heads, *lines]) for i in range(len(heads))]
     body = "\n".join(
@@ -105,3 +105,8 @@ def plausibility_table(evaluation: dict[str, Any]) -> str:
         for row in [heads, ["-" * width for width in widths], *lines]
     )
     return body + "\n" + textwrap.fill(LEGEND, 110)
+
+
+def _shown(value: float, decimals: int) -> str:
+    # Adding zero turns the minus zero of a rounded tiny number into a plain zero.
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"

@@ -43,6 +43,7 @@ def build_set(
     Raises `InputError` for unknown scenes, motions or methods before anything is computed.
     """
     folder = place_set(config, out, jobs, progress)
+    folder.sweep()
     drops = folder.drops()
     renders = [job for job in render_jobs(config, folder) if job.key not in drops]
     done = _run_all(run_render, renders, jobs, "render", progress)

@@ -12,6 +12,7 @@ clips/<clip_id>.mp4|.jpg  what participants see
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,6 +41,11 @@ class SetFolder:
                 raise InputError(self.path, "config.json", f"set {found.get('set_id')}", wanted)
             return
         write_json(marker, {**record, "sha256": config.sha256()})
+
+    def sweep(self) -> None:
+        """Remove what a killed run left half-made."""
+        for leftover in self.path.glob("clips/.partial-*"):
+            shutil.rmtree(leftover, ignore_errors=True)
 
     def motion_ids(self, config: StimulusSetConfig) -> tuple[str, ...]:
         """The motions of the main pool, in order."""
