@@ -60,7 +60,7 @@ def build_arrays() -> tuple[dict[str, Any], dict[str, Any]]:
     }
     for name, body in bodies.items():
         arrays[f"points_{name}"] = quantised_points(body)
-        arrays[f"joints_{name}"] = body.joints.astype(np.float32)
+        arrays[f"joints_{name}"] = _rounded_joints(body)
     subset, small_faces = _snapped(model, _SMALL_MESH, shapes["male_slim"], component)
     arrays["subset"] = subset.astype(np.uint16)
     arrays["subset_faces"] = small_faces.astype(np.uint16)
@@ -75,6 +75,12 @@ def quantised_points(body: MergedBody) -> Integer[np.ndarray, "E 3"]:
     if np.abs(steps).max() > np.iinfo(np.int16).max:
         raise InputError("body", "points", float(np.abs(local).max()), "less than 0.65 m")
     return np.asarray(steps, dtype=np.int16)
+
+
+def _rounded_joints(body: MergedBody) -> Float[np.ndarray, "22 3"]:
+    """Joint places to 10 nm, so that the file does not depend on the order of additions."""
+    # Adding zero turns -0.0 into 0.0.
+    return (np.round(body.joints, 8) + 0.0).astype(np.float32)
 
 
 def _provenance(

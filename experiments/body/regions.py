@@ -65,6 +65,8 @@ def contact_rows(
     subset: Integer[np.ndarray, " S"],
 ) -> Integer[np.ndarray, " C"]:
     """Vertices that thicken the contact areas of a small mesh: far from each other and from it."""
+    # The body is symmetric: without rounding, noise of 1e-17 would decide between left and right.
+    vertices = np.round(vertices, 6)
     chosen: list[int] = []
     for name, count in _EXTRA_POINTS.items():
         region = np.setdiff1d(regions[name], subset)
