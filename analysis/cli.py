@@ -1,4 +1,4 @@
-"""Commands of the analysis: `analyze`."""
+"""Commands of the analysis: `analyze`, `plan`, `check-claims`."""
 
 from __future__ import annotations
 
@@ -83,7 +83,95 @@ def check_claims(text: Path, results: Path | None, claims: Path | None, as_json:
     sys.exit(1 if wrong else 0)
 
 
-COMMANDS = {"analyze": analyze, "check-claims": check_claims}
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--rate",
+    "rates",
+    type=float,
+    multiple=True,
+    default=(0.6,),
+    show_default=True,
+    help="True rate of a comparison; repeat for several.",
+)
+@click.option(
+    "--participants",
+    type=click.IntRange(2),
+    multiple=True,
+    default=(20, 42, 80),
+    show_default=True,
+    help="Number of participants; repeat for a curve.",
+)
+@click.option(
+    "--answers",
+    type=click.IntRange(2),
+    default=20,
+    show_default=True,
+    help="Main trials of a participant per comparison.",
+)
+@click.option(
+    "--pool", type=click.IntRange(2), help="Stimuli per comparison; default: as many as answers."
+)
+@click.option(
+    "--sd-participant",
+    type=click.FloatRange(0),
+    default=0.5,
+    show_default=True,
+    help="Spread of participants on the logit scale.",
+)
+@click.option(
+    "--sd-stimulus",
+    type=click.FloatRange(0),
+    default=0.5,
+    show_default=True,
+    help="Spread of stimuli on the logit scale.",
+)
+@click.option(
+    "--dropout", type=float, default=0.0, show_default=True, help="Share who leave or are excluded."
+)
+@click.option(
+    "--runs",
+    type=click.IntRange(10),
+    default=400,
+    show_default=True,
+    help="Simulated studies a row.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def plan(
+    rates: tuple[float, ...], participants: tuple[int, ...], answers: int, pool: int | None,
+    sd_participant: float, sd_stimulus: float, dropout: float, runs: int, seed: int, as_json: bool,
+) -> None:  # fmt: skip
+    """Forecast power and interval width of a study before it is run, by the report's own estimator."""
+    from dataclasses import asdict
+
+    from rich.console import Console
+    from rich.progress import track
+
+    from analysis import planner
+
+    design = planner.Plan(
+        rates, participants[0], answers, pool or answers, sd_participant, sd_stimulus, dropout
+    )
+    planner.check_plan(design)
+    forecasts = []
+    shown = Console(stderr=True)
+    for count in track(participants, "simulating", console=shown, disable=not shown.is_terminal):
+        forecasts += planner.curve(design, [count], runs, seed)
+    if as_json:
+        click.echo(
+            json.dumps({"plan": asdict(design), "curve": [asdict(one) for one in forecasts]})
+        )
+        return
+    click.echo(planner.plan_table(design, forecasts))
+    floor = ", ".join(
+        f"{planner.independent_answers(rate, 0.8)} for {rate:.1%}" for rate in rates if rate != 0.5
+    )
+    click.echo(
+        f"If answers were independent (they are not), 80 % power would take {floor or 'no'} answers."
+    )
+
+
+COMMANDS = {"analyze": analyze, "check-claims": check_claims, "plan": plan}
 
 
 def main(name: str) -> None:
