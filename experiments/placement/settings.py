@@ -109,7 +109,9 @@ class PlacementSettings:
 
 
 PRESETS: dict[str, PlacementSettings] = {
-    "fast": PlacementSettings(preset="fast", n_starts=2, n_altered=1, outer_steps=6),
+    "fast": PlacementSettings(
+        preset="fast", keep_share=0.03, n_starts=2, n_altered=1, outer_steps=6
+    ),
     "default": PlacementSettings(),
     "paper": PlacementSettings(
         preset="paper",
