@@ -114,7 +114,8 @@ def _read_scene(
 
 def _any_below(distance: Float[np.ndarray, "T V"], limit: float) -> Float[np.ndarray, " T"]:
     # "Non-positive" in PACE's text: a vertex exactly on the surface touches.
-    return np.any(distance <= limit, axis=1).astype(np.float64)
+    touching: Float[np.ndarray, " T"] = np.any(distance <= limit, axis=1).astype(np.float64)
+    return touching
 
 
 def _predicted(
