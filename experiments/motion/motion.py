@@ -92,7 +92,8 @@ def read_motion(source: Path) -> Motion:
 
 def _load(source: Path) -> dict[str, Any]:
     try:
-        with np.load(source, allow_pickle=False) as archive:
+        # Opened by us: numpy leaks its own handle when the archive is damaged.
+        with source.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except FileNotFoundError:
         raise InputError(source, "file", "missing", "an existing motion .npz") from None
