@@ -18,7 +18,9 @@ from experiments.motion.rotations import (
     about,
     joint_positions,
     steady_slerp,
+    to_axis_angle,
     to_matrix,
+    to_quaternion,
     unit,
 )
 from experiments.motion.two_bone import middle_joint
@@ -185,5 +187,5 @@ def _hand(
 
 def _twist_about_x(local: Frames) -> Float[np.ndarray, " T"]:
     """Angle (degrees) of the part of a rotation that is about the bone: swing-twist decomposition."""
-    back = local[..., 1]
-    return np.asarray(np.degrees(np.unwrap(np.arctan2(back[:, 2], back[:, 1]))))
+    quaternion = to_quaternion(to_axis_angle(local))
+    return np.asarray(np.degrees(np.unwrap(2 * np.arctan2(quaternion[:, 0], quaternion[:, 3]))))

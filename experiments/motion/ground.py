@@ -31,7 +31,8 @@ def rest_on_floor(motion: Motion, figure: Figure) -> Motion:
     The shift is a smooth curve that never leaves anything below the floor, at the price of floating by
     some millimetres between.
     """
-    lowest = lowest_height(motion, figure, figure.body.body_component[::_EVERY])
+    skin = figure.body.body_component[::_EVERY]
+    lowest = lowest_height(motion, figure, np.concatenate([skin, *figure.soles]))
     above = maximum_filter1d(-lowest, 7, mode="nearest")
     return _raised(motion, gaussian_filter1d(above, 2.0, mode="nearest", truncate=1.5))
 

@@ -21,9 +21,9 @@ def step(
     stand = np.array(score.last(f"{other}_foot")[:2])
     goal = np.array(to)
     t = seconds
-    score.put(f"{side}_foot", (0.16 * t, (x0, y0, 0.0)), (0.34 * t, (*_between((x0, y0), to, 0.22), 0.75 * _LIFT_M)),
-              (0.58 * t, (*_between((x0, y0), to, 0.68), _LIFT_M)),
-              (0.82 * t, (*_between((x0, y0), to, 0.98), 0.35 * _LIFT_M)), (t, (*to, 0.0)))  # fmt: skip
+    arch = [(0.34, 0.22, 0.75), (0.58, 0.68, 1.0), (0.82, 0.98, 0.35)]
+    swing = [(at * t, (*_between((x0, y0), to, share), up * _LIFT_M)) for at, share, up in arch]
+    score.put(f"{side}_foot", (0.16 * t, (x0, y0, 0.0)), *swing, (t, (*to, 0.0)))
     score.put(f"{side}_heel", (0.14 * t, 8.0), (0.38 * t, 20.0), (0.8 * t, 3.0), (t, 0.0))
     score.put(f"{side}_toe_out", (0.3 * t, score.last(f"{side}_toe_out")[0]), (0.9 * t, toe_out))
     height = score.last("hip")[2]

@@ -9,7 +9,6 @@ import numpy as np
 from experiments.motion.compose import join
 from experiments.motion.deepmimic import pybullet_clip, read_deepmimic
 from experiments.motion.figure import Figure
-from experiments.motion.foot_lock import lock_feet
 from experiments.motion.gait import (
     MIRRORED_WALK,
     STEP_LEFT,
@@ -215,4 +214,4 @@ def floor_get_up(figure: Figure) -> Motion:
     recorded = low_pass(retarget(read_deepmimic(pybullet_clip(FLOOR_GET_UP)), figure))
     # The performer springs up; at four fifths of the pace it is an everyday movement.
     rising = resample(dataclasses.replace(recorded, times=recorded.times * _UNHURRIED))
-    return lock_feet(rest_on_floor(join(rising, standing, figure, 10, 18), figure), figure, 0.5)
+    return rest_on_floor(join(rising, standing, figure, 10, 18), figure)
