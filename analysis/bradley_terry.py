@@ -17,6 +17,7 @@ from scipy import optimize, sparse, stats
 from scipy.sparse.csgraph import connected_components
 
 MAX_STEPS = 100
+_CLUSTER_BLOCK = 50_000
 Link = Literal["logit", "probit"]
 
 
@@ -122,13 +123,11 @@ def clustered_covariance(
     eta = scale.ability[duels.first] - scale.ability[duels.second] + (scale.order or 0.0)
     slope = _slope(eta, duels.wins, duels.answers, link)
     groups = int(clusters.max()) + 1
-    scores = _cluster_sums(duels, clusters, slope, count)
-    if order:
-        scores = np.column_stack([scores, np.bincount(clusters, slope, groups)])
+    meat = _meat(duels, clusters, slope, count, order)
     bread = np.linalg.inv(information)
     n, k = duels.answers.sum(), len(beta)
     factor = groups / (groups - 1) * (n - 1) / max(n - k, 1)
-    middle = bread @ (scores.T @ scores) @ bread * factor
+    middle = bread @ meat @ bread * factor
     full = np.zeros((count, count))
     full[1:, 1:] = middle[: count - 1, : count - 1]
     return full
@@ -230,14 +229,31 @@ def _design(
     return np.column_stack([design, np.ones(len(first))]) if order else design
 
 
-def _cluster_sums(
-    duels: Duels, clusters: Int[np.ndarray, "D"], slope: Float[np.ndarray, "D"], count: int
-) -> Float[np.ndarray, "G L"]:
-    """Score of every ability but the reference's, summed by cluster, without a design matrix."""
-    groups, key = int(clusters.max()) + 1, clusters.astype(np.int64) * count
-    sums = np.bincount(key + duels.first, slope, groups * count)
-    sums -= np.bincount(key + duels.second, slope, groups * count)
-    return sums.reshape(groups, count)[:, 1:]
+def _meat(
+    duels: Duels,
+    clusters: Int[np.ndarray, "D"],
+    slope: Float[np.ndarray, "D"],
+    count: int,
+    order: bool,
+) -> Float[np.ndarray, "Q Q"]:
+    """Sum over clusters of the outer product of their scores, some clusters at a time.
+
+    Neither a design matrix nor all clusters' scores are ever held: there may be a million of them.
+    """
+    sorting = np.argsort(clusters, kind="stable")
+    ids = clusters[sorting]
+    meat = np.zeros((count - 1 + order, count - 1 + order))
+    for begin in range(0, int(ids[-1]) + 1, _CLUSTER_BLOCK):
+        low, high = np.searchsorted(ids, [begin, begin + _CLUSTER_BLOCK])
+        rows, key = sorting[low:high], (ids[low:high] - begin).astype(np.int64)
+        size = min(_CLUSTER_BLOCK, int(ids[-1]) + 1 - begin)
+        sums = np.bincount(key * count + duels.first[rows], slope[rows], size * count)
+        sums -= np.bincount(key * count + duels.second[rows], slope[rows], size * count)
+        scores = sums.reshape(size, count)[:, 1:]
+        if order:
+            scores = np.column_stack([scores, np.bincount(key, slope[rows], size)])
+        meat += scores.T @ scores
+    return meat
 
 
 def _slope(
