@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 import sqlalchemy
 from sqlalchemy import event
-from sqlalchemy.exc import ArgumentError, OperationalError
+from sqlalchemy.exc import ArgumentError, IntegrityError, OperationalError
 from sqlalchemy.orm import Session
 
 from renderer.files import InputError
@@ -53,15 +53,17 @@ class Database:
             yield session
 
     def retry(self, work: Callable[[Session], T]) -> T:
-        """Run `work` in a write transaction; repeat it when the database was busy or met a deadlock.
+        """Run `work` in a write transaction; repeat it when it lost a race.
 
-        `work` must be safe to run again from the start: everything it did was rolled back.
+        That is: the database was busy, met a deadlock, or a unique key was taken a moment ago by
+        another request; the next attempt finds what that one stored. `work` must be safe to run
+        again from the start: everything it did was rolled back.
         """
         for attempt in range(1, _ATTEMPTS + 1):
             try:
                 with self.write() as session:
                     return work(session)
-            except OperationalError:
+            except (OperationalError, IntegrityError):
                 if attempt == _ATTEMPTS:
                     raise
                 time.sleep(0.02 * 2**attempt * random.uniform(0.5, 1.5))
@@ -111,12 +113,17 @@ def _engine(url: str) -> sqlalchemy.Engine:
     if address.drivername == "postgresql":
         address = address.set(drivername="postgresql+psycopg")
     if address.get_backend_name() == "sqlite":
-        engine = sqlalchemy.create_engine(address, connect_args={"timeout": _BUSY_MS / 1000})
+        # Parameters stay out of error texts: they hold tokens.
+        engine = sqlalchemy.create_engine(
+            address, connect_args={"timeout": _BUSY_MS / 1000}, hide_parameters=True
+        )
         _prepare_sqlite(engine)
         return engine
     if address.drivername != "postgresql+psycopg":
         raise InputError("database", "url", address.drivername, "sqlite or postgresql")
-    return sqlalchemy.create_engine(address, pool_size=10, max_overflow=20, pool_pre_ping=True)
+    return sqlalchemy.create_engine(
+        address, pool_size=10, max_overflow=20, pool_pre_ping=True, hide_parameters=True
+    )
 
 
 def _prepare_sqlite(engine: sqlalchemy.Engine) -> None:

@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 import re
+import time
 from typing import Any
 
-from flask import Blueprint, flash, redirect, render_template, request, session, url_for
+from flask import (
+    Blueprint,
+    flash,
+    make_response,
+    redirect,
+    render_template,
+    request,
+    session,
+    url_for,
+)
 from flask.typing import ResponseReturnValue
 from sqlalchemy.orm import Session
 
@@ -148,14 +158,18 @@ def _step_page(person: Participant, page: str) -> str:
 def _trial_page(study_id: str) -> ResponseReturnValue:
     here = installation()
     person_id = _person_id(study_id)
+    began = time.perf_counter()
     services.bind_window(here.database, person_id, here.now(), here.settings.window, here.lease)
+    bound_ms = 1000 * (time.perf_counter() - began)
     view = here.database.retry(
         lambda db: trial_view(db, person_id, here.now(), here.lease, here.settings.window)
     )
     if view is None:  # the last trials were given up meanwhile
         return redirect(url_for(".session_page", study_id=study_id), 303)
     config = view.pop("config")
-    return render_template("trial.html", **_frame(config), **view)
+    page = make_response(render_template("trial.html", **_frame(config), **view))
+    page.headers["Server-Timing"] = f"allocate;dur={bound_ms:.1f}"
+    return page
 
 
 def _done_page(study_id: str, person_id: int) -> ResponseReturnValue:

@@ -51,6 +51,7 @@ def serve_forever(settings: Settings, host: str, port: int, as_json: bool) -> No
     """Bring the schema up to date, listen, print the address once, serve until stopped."""
     database = Database(settings.database_url)
     upgrade(database)
+    create_app(settings, database)  # makes the keys once, before workers could race for them
     database.close()
 
     def announce(address: str) -> None:

@@ -6,11 +6,8 @@ import importlib.util
 import itertools
 import json
 import os
-import shutil
-import socket
 import subprocess
 import sys
-import tempfile
 import time
 import uuid
 from collections.abc import Callable, Iterator
@@ -59,44 +56,11 @@ def still_stimuli(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Path(_helper("stimulus_set").write_still_stimuli(folder))
 
 
-def _postgresql_bin() -> Path:
-    found = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
-    assert found, "no PostgreSQL server: install the Debian package postgresql"
-    return found[-1].parent
-
-
-def _as_postgres(command: list[str]) -> list[str]:
-    """PostgreSQL refuses to run as root; its own unprivileged user runs it there."""
-    return ["runuser", "-u", "postgres", "--", *command] if os.geteuid() == 0 else command
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.fixture(scope="session")
 def postgresql_server() -> Iterator[str]:
-    """An own cluster on a free port, thrown away afterwards; gives its address without database."""
-    programs = _postgresql_bin()
-    folder = Path(tempfile.mkdtemp(prefix="pace-pg-", dir="/tmp"))
-    if os.geteuid() == 0:
-        shutil.chown(folder, "postgres", "postgres")
-    data, port = folder / "data", free_port()
-    initdb = [str(programs / "initdb"), "-D", str(data), "-U", "pace", "-A", "trust", "--no-sync"]
-    options = f"-p {port} -c listen_addresses=127.0.0.1 -c unix_socket_directories={folder}"
-    options += " -c fsync=off -c max_connections=200"
-    control = [str(programs / "pg_ctl"), "-D", str(data), "-w"]
-    start = [*control, "-l", str(folder / "log"), "-o", options, "start"]
-    quiet: dict[str, Any] = {"check": True, "stdout": subprocess.DEVNULL, "cwd": "/tmp"}
-    subprocess.run(_as_postgres(initdb), **quiet)
-    subprocess.run(_as_postgres(start), **quiet)
-    try:
-        yield f"postgresql://pace@127.0.0.1:{port}"
-    finally:
-        subprocess.run(_as_postgres([*control, "-m", "immediate", "stop"]), **quiet)
-        shutil.rmtree(folder, ignore_errors=True)
+    """Gives the address of a cluster without a database name."""
+    with _helper("postgres").postgresql_cluster() as address:
+        yield address
 
 
 _numbers = itertools.count()

@@ -41,20 +41,27 @@ def tiny_png() -> bytes:
     )
 
 
-def write_stimuli(folder: Path, masters: list[Path], seconds: float = 1.0) -> Path:
+def write_stimuli(
+    folder: Path,
+    masters: list[Path],
+    scenes: tuple[str, ...] = SCENES,
+    motions: tuple[str, ...] = MOTIONS,
+    methods: tuple[str, ...] = METHODS,
+    seconds: float = 1.0,
+) -> Path:
     """A catalogue with every method in every scene and motion, two catch and two practice pairs."""
     (folder / "clips").mkdir(parents=True)
     (folder / "poster.png").write_bytes(tiny_png())
-    wanted = [("main", s, m, x) for s in SCENES for m in MOTIONS for x in METHODS]
-    wanted += [("catch", s, "walk_0", x) for s in SCENES for x in ("pace", "lifted")]
-    wanted += [("practice", s, "sit_0", x) for s in SCENES for x in ("posa_t", "lifted")]
+    wanted = [("main", s, m, x) for s in scenes for m in motions for x in methods]
+    wanted += [("catch", s, motions[0], x) for s in scenes for x in ("pace", "lifted")]
+    wanted += [("practice", s, "sit_0", x) for s in scenes for x in ("posa_t", "lifted")]
     clips = [
         _clip(folder, masters[number % len(masters)], number, row, seconds)
         for number, row in enumerate(wanted)
     ]
-    named = tuple({"name": name} for name in METHODS)
-    scenes = tuple({"scene": name} for name in SCENES)
-    motions = tuple({"motion": name} for name in MOTIONS)
+    named = tuple({"name": name} for name in methods)
+    scenes = tuple({"scene": name} for name in scenes)
+    motions = tuple({"motion": name} for name in motions)
     catalogue = Catalogue(
         "tiny", "2026-01-01T00:00:00Z", {"seed": 0}, scenes, motions, named, (), tuple(clips)
     )
