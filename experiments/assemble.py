@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.metadata
 import platform
 import subprocess
@@ -52,9 +53,17 @@ def assemble_catalogue(config: StimulusSetConfig, folder: SetFolder) -> Catalogu
         motions=tuple(_motion_records(config, folder)),
         methods=tuple(_method_records(config)),
         cameras=tuple(cameras),
-        clips=tuple(c for c in clips if c.role != "main" or (c.scene, c.motion) not in hidden),
+        clips=tuple(
+            clip
+            for clip in sorted(clips, key=lambda clip: clip.clip_id)
+            if clip.role != "main" or (clip.scene, clip.motion) not in hidden
+        ),
         dropped=(*drops.values(), *unseen),
     )
+    earlier = _earlier(folder.path)
+    if earlier and dataclasses.replace(catalogue, generator=earlier.generator) == earlier:
+        # Nothing was made anew, so the record of who made it stays true.
+        return earlier
     faults = fairness_faults(catalogue, folder.path)
     if faults:
         raise InputError(folder.path, "clips", faults[0], "pairs that differ in the method only")
@@ -77,10 +86,13 @@ def _unseen(config: StimulusSetConfig, cameras: list[dict[str, Any]]) -> list[di
     return found
 
 
+def _earlier(folder: Path) -> Catalogue | None:
+    return read_catalogue(folder) if (folder / FILE_NAME).exists() else None
+
+
 def _created_at(folder: Path) -> str:
-    if (folder / FILE_NAME).exists():
-        return read_catalogue(folder).created_at
-    return datetime.now(UTC).isoformat(timespec="seconds")
+    earlier = _earlier(folder)
+    return earlier.created_at if earlier else datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def _generator(config: StimulusSetConfig) -> dict[str, Any]:
