@@ -21,7 +21,9 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PACE_CACHE", str(tmp_path))
 
 
-def rectangle(centre: tuple[float, float, float], side: float, normal: tuple[float, float, float], group: str) -> Surface:  # fmt: skip
+def rectangle(
+    centre: tuple[float, float, float], side: float, normal: tuple[float, float, float], group: str
+) -> Surface:
     up = np.array(normal, dtype=float)
     u = np.cross(up, [0.3, 0.5, 0.8])
     u /= np.linalg.norm(u)
@@ -43,7 +45,10 @@ def test_the_open_sky_is_the_mean_of_its_own_gradient() -> None:
 
 
 def test_a_lid_close_above_makes_the_darkest_floor() -> None:
-    small, lid = rectangle((0, 0, 0), 0.1, (0, 0, 1), "floor"), rectangle((0, 0, 0.004), 50.0, (0, 0, -1), "lid")  # fmt: skip
+    small, lid = (
+        rectangle((0, 0, 0), 0.1, (0, 0, 1), "floor"),
+        rectangle((0, 0, 0.004), 50.0, (0, 0, -1), "lid"),
+    )
     under, _ = bake_occlusion([small, lid])
     assert under.factor.max() < DARKEST + 0.02
 

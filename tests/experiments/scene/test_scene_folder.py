@@ -130,11 +130,18 @@ def test_an_altered_or_missing_file_is_named(folder: Path, name: str) -> None:
 
 
 def no_floor(mesh: LabelledMesh) -> LabelledMesh:
-    return LabelledMesh(mesh.vertices, mesh.faces, np.where(mesh.label == 2, 1, mesh.label).astype(np.uint8), mesh.instance)  # fmt: skip
+    return LabelledMesh(
+        mesh.vertices,
+        mesh.faces,
+        np.where(mesh.label == 2, 1, mesh.label).astype(np.uint8),
+        mesh.instance,
+    )
 
 
 def y_up(mesh: LabelledMesh) -> LabelledMesh:
-    return LabelledMesh(np.ascontiguousarray(mesh.vertices[:, [0, 2, 1]]), mesh.faces, mesh.label, mesh.instance)  # fmt: skip
+    return LabelledMesh(
+        np.ascontiguousarray(mesh.vertices[:, [0, 2, 1]]), mesh.faces, mesh.label, mesh.instance
+    )
 
 
 def unlabelled(mesh: LabelledMesh) -> LabelledMesh:
@@ -168,7 +175,9 @@ def test_a_mesh_without_what_a_scene_needs_is_refused(
 
 
 def test_a_ply_without_labels_or_cut_short_is_refused(tmp_path: Path) -> None:
-    sound = LabelledMesh(np.eye(3, dtype=np.float32), np.int32([[0, 1, 2]]), np.uint8([2, 2, 2]), np.int32([0, 0, 0]))  # fmt: skip
+    sound = LabelledMesh(
+        np.eye(3, dtype=np.float32), np.int32([[0, 1, 2]]), np.uint8([2, 2, 2]), np.int32([0, 0, 0])
+    )
     write_ply(tmp_path / "a.ply", sound)
     content = (tmp_path / "a.ply").read_bytes()
     (tmp_path / "a.ply").write_bytes(content[:-3])
