@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from experiments.scene.enclosure import enclosed
 from experiments.scene.exact import nearest_triangle
+from experiments.scene.furnish import triangle_areas
 from experiments.scene.objects import PlacedObject
 from experiments.scene.scene import MPCAT40
 from experiments.scene.settle import settled_height, surface_heights
@@ -25,6 +26,8 @@ _GAP = 0.012
 _ROD = 0.08
 """Metres between a wall and the curtains that hang before it."""
 _OUTSIDE = 0.005
+_SLIVER = 1e-7
+"""Square metres below which a triangle has no dependable plane."""
 _REACH = 0.45
 """Metres from the walkable floor within which a seat counts as reachable."""
 SEAT_HEIGHTS: dict[str, tuple[float, float]] = {
@@ -218,7 +221,8 @@ def _depth(
     if len(inside) < _OVERLAP_POINTS:
         return 0.0
     deepest = inside[np.argsort(-distance[inside], kind="stable")[: 4 * _OVERLAP_POINTS]]
-    exact = sorted(nearest_triangle(point, triangles)[0] for point in near[deepest])
+    proper = triangles[triangle_areas(triangles) > _SLIVER]
+    exact = sorted(nearest_triangle(point, proper)[0] for point in near[deepest])
     return exact[-_OVERLAP_POINTS]
 
 
@@ -259,7 +263,7 @@ def _support_gap(
     under = surface_heights(support, lowest[:, :2])
     gap = lowest[:, 2] - under
     carried = np.abs(gap) < 0.05
-    if not carried.any() or (not soft and carried.mean() < 0.5):
+    if not carried.any() or (not soft and carried.mean() <= 0.5):
         return float("inf")
     return float(np.min(np.abs(gap[carried])))
 

@@ -16,6 +16,7 @@ Shape = Callable[..., tuple[ShapePart, ...]]
 SHAPES: Mapping[str, Shape] = {
     shape.__name__: shape
     for shape in (
+        furniture.armchair,
         furniture.bench,
         furniture.board,
         furniture.bookcase,
@@ -63,7 +64,14 @@ def make_shape(
             raise InputError(source, f"{name}.{key}", value, "one of " + ", ".join(known))
         if (wanted := _kind(known[key].default)) != _kind(value):
             raise InputError(source, f"{name}.{key}", value, wanted)
-    return shape(**params)
+    return shape(**{key: _as(known[key].default, value) for key, value in params.items()})
+
+
+def _as(default: Any, value: Any) -> Any:
+    """The value in the number type of the default: TOML tells 2 from 2.0."""
+    if isinstance(default, tuple):
+        return tuple(float(entry) for entry in value)
+    return type(default)(value)
 
 
 def _kind(value: Any) -> str:
@@ -72,4 +80,4 @@ def _kind(value: Any) -> str:
         return f"a list of {len(value)} numbers"
     if isinstance(value, bool):
         return "true or false"
-    return "a number"
+    return "a number" if isinstance(value, int | float) else "nothing else"

@@ -73,6 +73,36 @@ def _pedestal(width: float, depth: float, height: float) -> list[Triangles]:
     ]
 
 
+def armchair(
+    *,
+    size: Size3 = (0.80, 0.82, 0.84),
+    seat: float = 0.43,
+    colour: Colour = (0.52, 0.49, 0.42),
+    legs: Colour = (0.34, 0.25, 0.18),
+) -> tuple[ShapePart, ...]:
+    """An upholstered armchair: padded seat between two arms, a leaning back, short wooden legs."""
+    width, depth, height = size
+    foot, arm, back = 0.12, 0.15, 0.19
+    x, y = width / 2 - 0.07, depth / 2 - 0.07
+    feet = [cylinder(0.016, foot + 0.02, (sx * x, sy * y, 0), 10, 0.026) for sx, sy in _SIGNS]
+    body = box((width - 0.04, depth - 0.06, seat - 0.24), (0, 0, foot), bevel=0.02)
+    arms = [
+        superellipsoid((arm, depth - 0.03, 0.60 - foot), (s * (width - arm) / 2, -0.01, foot), 0.28, 0.25, 24)
+        for s in (-1, 1)
+    ]  # fmt: skip
+    pad = (width - 2 * arm + 0.02, depth - back - 0.04, 0.18)
+    seat_pad = superellipsoid(pad, (0, -back / 2 - 0.02, seat - 0.18), 0.22, 0.2, 24)
+    rest = superellipsoid(
+        (width - 0.03, back, height - foot), (0, (depth - back) / 2 - 0.02, foot), 0.32, 0.3, 24
+    )
+    lean = turned(rest, "x", -5, (0, depth / 2, foot))
+    cushion = superellipsoid(
+        (pad[0] - 0.02, 0.15, 0.42), (0, depth / 2 - back - 0.05, seat - 0.03), 0.45, 0.35, 20
+    )
+    leaning = turned(cushion, "x", -12, (0, depth / 2 - back, seat))
+    return part(colour, body, *arms, seat_pad, lean, leaning), part(legs, *feet)
+
+
 def bench(
     *,
     size: Size3 = (1.3, 0.62, 1.1),

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, UInt8
 
-Triangles = Float[np.ndarray, "F 3 3"]
-Vector = Sequence[float]
+Triangles = Float[np.ndarray, "_ 3 3"]
+Vector = Sequence[float | int]
 Colour = tuple[float, float, float]
 
 
@@ -142,7 +142,7 @@ def sheet(grid: Float[np.ndarray, "N M 3"], thickness: float) -> Triangles:
     return np.concatenate([surface(front), surface(back)[:, ::-1]])
 
 
-def turned(corners: Triangles, axis: str, degrees: float, about: Vector = (0, 0, 0)) -> Triangles:
+def turned(corners: Triangles, axis: str, degrees: float | int, about: Vector = (0, 0, 0)) -> Triangles:
     """Rotate about an axis through a point, counter-clockwise seen from the axis' tip."""
     angle = np.radians(degrees)
     c, s = np.cos(angle), np.sin(angle)

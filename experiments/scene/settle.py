@@ -8,6 +8,8 @@ from jaxtyping import Float
 _PATCH = 0.35
 """Side of the probed patch as a share of the smaller side of the footprint."""
 _RAYS = 5
+_CHUNK = 400_000
+"""Point-triangle pairs looked at in one go."""
 
 
 def settled_height(
@@ -38,25 +40,26 @@ def surface_heights(
     low, high = corners[..., :2].min(1), corners[..., :2].max(1)
     near = np.all((high >= points.min(0)) & (low <= points.max(0)), axis=1)
     a, b, c = (corners[near, k] for k in range(3))
-    heights = np.full(len(points), -np.inf)
-    for index, point in enumerate(points):
-        heights[index] = _height_over(point, a, b, c)
+    chunk = max(1, _CHUNK // max(len(a), 1))
+    parts = [_heights(points[i : i + chunk], a, b, c) for i in range(0, len(points), chunk)]
+    heights = np.concatenate(parts)
     return np.where(np.isneginf(heights), np.nan, heights)
 
 
-def _height_over(
-    point: Float[np.ndarray, " 2"],
+def _heights(
+    points: Float[np.ndarray, "N 2"],
     a: Float[np.ndarray, "M 3"],
     b: Float[np.ndarray, "M 3"],
     c: Float[np.ndarray, "M 3"],
-) -> float:
-    """Greatest z of the triangles at one point by barycentric coordinates; -inf where none."""
-    e1, e2, to = b[:, :2] - a[:, :2], c[:, :2] - a[:, :2], point - a[:, :2]
+) -> Float[np.ndarray, " N"]:
+    """Greatest z of the triangles at each point by barycentric coordinates; -inf where none."""
+    e1, e2 = b[:, :2] - a[:, :2], c[:, :2] - a[:, :2]
     area = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
     flat = np.abs(area) < 1e-12
     safe = np.where(flat, 1.0, area)
-    u = (to[:, 0] * e2[:, 1] - to[:, 1] * e2[:, 0]) / safe
-    v = (e1[:, 0] * to[:, 1] - e1[:, 1] * to[:, 0]) / safe
+    x, y = points[:, :1] - a[:, 0], points[:, 1:] - a[:, 1]
+    u = (x * e2[:, 1] - y * e2[:, 0]) / safe
+    v = (e1[:, 0] * y - e1[:, 1] * x) / safe
     inside = ~flat & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
     z = a[:, 2] + u * (b[:, 2] - a[:, 2]) + v * (c[:, 2] - a[:, 2])
-    return float(z[inside].max()) if inside.any() else -np.inf
+    return np.max(np.where(inside, z, -np.inf), axis=1, initial=-np.inf)

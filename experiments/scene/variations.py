@@ -24,7 +24,6 @@ FAMILIES: tuple[tuple[str, ...], ...] = (
      "osaka_chair_125", "chair_143", "chair_171"),
     ("plant_126", "decorative_plant_113"),
     ("sofa_132", "winchester_sofa_140", "couch_95"),
-    ("armchair_86", "winchester_armchair_139"),
 )  # fmt: skip
 """Pieces that may stand in for one another."""
 CLUTTER: tuple[tuple[str, str, str], ...] = (
@@ -178,27 +177,29 @@ def _made_sound(base: Layout, changes: dict[str, Item | None], pack: Pack) -> La
     """Take back the changes that cause faults, round by round, until the room is sound."""
     original = {item.id: item for item in base.items}
     for _ in range(_ROUNDS):
-        changes = {
-            name: item for name, item in changes.items() if _stands(item, changes, base, pack)
-        }
+        changes = {name: item for name, item in changes.items() if _stands(item, base, pack)}
         varied = _applied(base, changes)
         report, _ = check_layout(varied.name, varied.size, furnish(varied, pack))
         if not report.faults():
             return varied
         culprits = _culprits(report)
-        changes = {
+        culprits |= {item.on for item in varied.items if item.id in culprits and item.on}
+        kept = {
             name: item
             for name, item in changes.items()
             if (culprits and name not in culprits) or (not culprits and name not in original)
         }
+        if kept == changes:
+            break
+        changes = kept
     raise InputError(base.name, "layout", report.faults()[0], "a room that passes the checks")
 
 
-def _stands(item: Item | None, changes: dict[str, Item | None], base: Layout, pack: Pack) -> bool:
+def _stands(item: Item | None, base: Layout, pack: Pack) -> bool:
     """Whether dropped clutter has its support under it."""
     if item is None or not item.id.startswith("dropped"):
         return True
-    support = changes.get(str(item.on)) or base.item(str(item.on))
+    support = base.item(str(item.on))
     try:
         furnish(replace(base, items=(replace(support, on=None), item)), pack)
     except InputError:
@@ -208,13 +209,23 @@ def _stands(item: Item | None, changes: dict[str, Item | None], base: Layout, pa
 
 def _applied(base: Layout, changes: dict[str, Item | None]) -> Layout:
     """The layout with its changes; what stands on something that moved moves along."""
+    before = {item.id: item for item in base.items}
     items: dict[str, Item] = {}
-    for item in base.items:
-        new = changes.get(item.id, item)
-        if new is not None:
-            items[item.id] = new
-    added = [item for name, item in changes.items() if item and name not in items]
-    return replace(base, items=(*items.values(), *(i for i in added if i.on in items)))
+    for name, item in {**before, **changes}.items():
+        if item is None or (item.on is not None and item.on not in items):
+            continue
+        support = before.get(item.on or "")
+        items[name] = item if support is None else _carried(item, support, items[support.id])
+    return replace(base, items=tuple(items.values()))
+
+
+def _carried(item: Item, before: Item, after: Item) -> Item:
+    """The item moved and turned with its support."""
+    turn = np.radians(after.yaw - before.yaw)
+    dx, dy = item.x - before.x, item.y - before.y
+    x = after.x + np.cos(turn) * dx - np.sin(turn) * dy
+    y = after.y + np.sin(turn) * dx + np.cos(turn) * dy
+    return replace(item, x=float(x), y=float(y), yaw=item.yaw + after.yaw - before.yaw)
 
 
 def _culprits(report: LayoutReport) -> set[str]:
