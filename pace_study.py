@@ -29,7 +29,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "simulate": ("study_app.cli:simulate", "Let simulated participants answer over HTTP."),
     "analyze": ("analysis.cli:analyze", "Turn answers into preference tables."),
     "plan": ("analysis.cli:plan", "Forecast power and interval width of a study."),
-    "check-claims": ("analysis.cli:check_claims", "Check the numbers of a text against the results."),
+    "check-claims": ("analysis.cli:check_claims", "Check the numbers of a text."),
 }
 
 
