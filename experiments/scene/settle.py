@@ -62,4 +62,4 @@ def _heights(
     v = (e1[:, 0] * y - e1[:, 1] * x) / safe
     inside = ~flat & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
     z = a[:, 2] + u * (b[:, 2] - a[:, 2]) + v * (c[:, 2] - a[:, 2])
-    return np.max(np.where(inside, z, -np.inf), axis=1, initial=-np.inf)
+    return np.asarray(np.max(np.where(inside, z, -np.inf), axis=1, initial=-np.inf))
