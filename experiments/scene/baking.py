@@ -9,6 +9,7 @@ from experiments.scene.assembly import CELL, THICKNESS, assemble
 from experiments.scene.furnish import furnish
 from experiments.scene.layout import Layout, read_layout
 from experiments.scene.objects import PlacedObject
+from experiments.scene.pack import default_pack
 from experiments.scene.progress import progress_bar
 from experiments.scene.scene import Scene
 from experiments.scene.scene_folder import is_scene_folder, read_scene, write_scene
@@ -36,5 +37,13 @@ def bake_layout(layout: Layout, objects: Sequence[PlacedObject], cell: float = C
 def bake_scene_folder(name: str | Path, folder: Path, cell: float = CELL) -> Scene:
     """Write a room as a scene folder that other programs can read."""
     scene = load_room(name, cell)
-    write_scene(folder, scene, stage_parts(name), licence="CC0-1.0")
+    write_scene(folder, scene, stage_parts(name), licence="CC0-1.0", credits=_credits(scene))
     return scene
+
+
+def _credits(scene: Scene) -> list[str]:
+    """Who made the pieces of the furniture pack that stand in this room."""
+    pack = default_pack()
+    used = sorted({i.asset for i in scene.instances if i.asset.startswith("pack:")})
+    pieces = [pack.piece(asset.removeprefix("pack:")) for asset in used]
+    return [f"{piece.title}: {piece.creator}" for piece in pieces]

@@ -10,6 +10,7 @@ from experiments.scene.baking import bake_scene_folder, load_room
 from experiments.scene.layout import read_layout
 from experiments.scene.lookup import SceneLookup
 from experiments.scene.scene import MPCAT40
+from experiments.scene.scene_folder import read_about
 from experiments.scene.stage_parts import stage_parts
 from renderer.files import InputError
 
@@ -52,6 +53,7 @@ def test_a_room_written_as_a_folder_loads_and_draws_the_same(tmp_path: Path) -> 
     back, parts = load_room(tmp_path / "booth"), stage_parts(tmp_path / "booth")
     assert back.content_hash == scene.content_hash and back.instances == scene.instances
     np.testing.assert_array_equal(back.volumes.thickened, scene.volumes.thickened)
+    assert any(": " in credit for credit in read_about(tmp_path / "booth")["credits"])
     drawn = stage_parts("booth")
     assert [part.group for part in parts] == [part.group for part in drawn]
     assert {part.instance for part in parts} >= {item.id for item in read_layout("booth").items}
