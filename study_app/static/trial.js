@@ -81,13 +81,21 @@ function enhance() {
 /** Play some clips from their beginning, in step. @param {ClipWatch[]} chosen */
 async function start(chosen) {
   for (const watch of both) if (!chosen.includes(watch)) watch.stop();
-  byId("pause")?.remove();
+  endBreak();
   try {
     await Promise.all(chosen.map((watch) => watch.ready()));
     await Promise.all(chosen.map((watch) => watch.play()));
   } catch (error) {
     if (error instanceof DOMException && error.name === "NotAllowedError") say(text("Blocked"));
   }
+}
+
+/** Who plays at once has had break enough; the time of the trial counts from here. */
+function endBreak() {
+  const pause = document.getElementById("pause");
+  if (!pause) return;
+  pause.remove();
+  paintedAt = performance.now();
 }
 
 /** Bring the page in line with what was seen and chosen so far. */
