@@ -43,11 +43,16 @@ def analyze(
     bootstraps: int, as_json: bool,
 ) -> None:  # fmt: skip
     """Turn the answers in RESPONSES (responses.csv) into preference tables, figures and a report."""
+    from rich.console import Console
+
     from analysis.analyze import analyze as run
     from analysis.analyze import summary
     from analysis.tables import terminal_table
 
-    results = run(responses, out, seed=seed, mode=mode, catalogue=catalogue, bootstraps=bootstraps)
+    with Console(stderr=True).status("analysing"):
+        results = run(
+            responses, out, seed=seed, mode=mode, catalogue=catalogue, bootstraps=bootstraps
+        )
     if as_json:
         click.echo(json.dumps(summary(results, out)))
         return

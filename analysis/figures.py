@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -60,11 +61,11 @@ def draw(figure: Drawing, results: Results) -> dict[str, bytes]:
 def forest(results: Results) -> Figure:
     """Rate per baseline: headline interval thick, naive interval thin and dashed below, 50 % dotted."""
     rows = ordered(results)
-    figure, axes = _canvas(7.2, 1.1 + 0.52 * len(rows))
+    figure, axes = _canvas(7.2, 0.8 + 0.52 * len(rows))
     for place, (_, row) in enumerate(rows):
         low, high = (100 * bound for bound in row["ci"])
         axes.plot([low, high], [place, place], color=INK, lw=2.6, solid_capstyle="butt", zorder=3)
-        axes.plot(100 * row["rate"], place, "o", color=INK, ms=6, zorder=4)
+        axes.plot(100 * row["rate"], place, "o", color=INK, ms=6, zorder=4, clip_on=False)
         naive = [100 * bound for bound in row["ci_naive"]]
         axes.plot(naive, [place + 0.22] * 2, color=GREY, lw=1, ls=(0, (3, 2)), zorder=2)
         shown = row["display"]
@@ -72,7 +73,7 @@ def forest(results: Results) -> Figure:
         axes.text(102, place, text, va="center", ha="left", fontsize=8.5)
     axes.axvline(50, color=GREY, lw=1, ls=":", zorder=1)
     _share_axis(axes, f"answers in favour of {', '.join(results['targets'])} (%)")
-    axes.set_yticks(range(len(rows)), [f"{name}  (n = {row['n']:,})" for name, row in rows])
+    axes.set_yticks(range(len(rows)), [_label(name, f"n = {row['n']:,}") for name, row in rows])
     axes.set_ylim(len(rows) - 0.45, -0.55)
     legend = "thick: clustered interval    dashed: assumes independent answers"
     axes.set_title(legend, fontsize=7.5, color=GREY, loc="left")
@@ -82,7 +83,7 @@ def forest(results: Results) -> Figure:
 def shares(results: Results) -> Figure:
     """Diverging bars around an even split; the share of the small side stands outside its bar."""
     rows = ordered(results)
-    figure, axes = _canvas(7.2, 1.0 + 0.42 * len(rows))
+    figure, axes = _canvas(7.2, 0.7 + 0.42 * len(rows))
     for place, (_, row) in enumerate(rows):
         won, lost = 100 * row["rate"], 100 - 100 * row["rate"]
         axes.barh(place, won, color=INK, height=0.56)
@@ -94,7 +95,7 @@ def shares(results: Results) -> Figure:
     axes.set_xlim(-118, 118)
     axes.set_xticks([-100, -50, 0, 50, 100], ["100", "50", "0", "50", "100"])
     axes.set_xlabel(f"chose the other (%)      chose {', '.join(results['targets'])} (%)")
-    axes.set_yticks(range(len(rows)), [f"{name}  (n = {row['n']:,})" for name, row in rows])
+    axes.set_yticks(range(len(rows)), [_label(name, f"n = {row['n']:,}") for name, row in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
     _bare_left(axes)
     return figure
@@ -106,19 +107,21 @@ def scene_panels(results: Results) -> Figure:
     names = sorted({scene["scene"] for _, row in rows for scene in row["scenes"]})
     columns = min(3, len(rows))
     depth = -(-len(rows) // columns)
-    figure, grid = _grid(depth, columns, 2.5 * columns + 1.0, (0.9 + 0.3 * len(names)) * depth)
+    figure, grid = _grid(depth, columns, 2.5 * columns + 1.0, (0.9 + 0.26 * len(names)) * depth)
     for axes, (name, row) in zip(grid, rows, strict=False):
         axes.axvline(100 * row["rate"], color=SECOND, lw=0.8, zorder=1)
         axes.axvline(50, color=GREY, lw=1, ls=":", zorder=1)
         for scene in row["scenes"]:
             place = names.index(scene["scene"])
             axes.plot([100 * b for b in scene["ci"]], [place, place], color=INK, lw=2, zorder=2)
-            axes.plot(100 * scene["rate"], place, "o", color=INK, ms=4.5, zorder=3)
-        axes.set_title(f"{name}  (n = {row['n']:,})", fontsize=8.5, loc="left")
+            axes.plot(100 * scene["rate"], place, "o", color=INK, ms=4.5, zorder=3, clip_on=False)
+        axes.set_title(_label(name, f"n = {row['n']:,}"), fontsize=8.5, loc="left")
         _share_axis(axes, "")
         axes.set_xticks([0, 50, 100])
         axes.set_yticks(range(len(names)), names)
         axes.set_ylim(len(names) - 0.5, -0.5)
+    for axes in grid[len(rows) - columns : len(rows)]:
+        axes.tick_params(labelbottom=True)  # the lowest panel of every column
     for axes in grid[len(rows) :]:
         axes.set_visible(False)
     figure.supxlabel(f"answers in favour of {', '.join(results['targets'])} (%)", fontsize=9)
@@ -130,7 +133,7 @@ def participant_dots(results: Results) -> Figure:
     rows = [(name, row) for name, row in ordered(results) if row["participant_counts"]]
     stacks = [_stacks([k / n for k, n in row["participant_counts"]]) for _, row in rows]
     tallest = max(max(stack.values()) for stack in stacks)
-    figure, axes = _canvas(7.2, 1.0 + 1.0 * len(rows))
+    figure, axes = _canvas(7.2, 0.6 + 1.0 * len(rows))
     step = min(0.09, 0.66 / tallest)
     for place, ((_, row), stack) in enumerate(zip(rows, stacks, strict=True)):
         for value, height in stack.items():
@@ -144,12 +147,12 @@ def participant_dots(results: Results) -> Figure:
                 mew=0,
                 clip_on=False,
             )
-        axes.plot(100 * row["rate"], place + 0.42, "^", color=SECOND, ms=6)
+        axes.plot(100 * row["rate"], place + 0.42, "^", color=SECOND, ms=6, clip_on=False)
     axes.axvline(50, color=GREY, lw=1, ls=":", zorder=0)
     _share_axis(
         axes, f"answers of one participant in favour of {', '.join(results['targets'])} (%)"
     )
-    labels = [f"{name}\n({row['participants']} participants)" for name, row in rows]
+    labels = [_label(name, f"{row['participants']} participants") for name, row in rows]
     axes.set_yticks(range(len(rows)), labels)
     axes.set_ylim(len(rows) - 0.42, -0.5)
     return figure
@@ -158,7 +161,7 @@ def participant_dots(results: Results) -> Figure:
 def scale(results: Results) -> Figure:
     """One row a method: ability relative to the mean, clustered interval, the target hollow."""
     methods = results["scale"]["methods"]
-    figure, axes = _canvas(7.2, 0.9 + 0.36 * len(methods))
+    figure, axes = _canvas(7.2, 0.6 + 0.36 * len(methods))
     for place, row in enumerate(methods):
         half = 1.96 * row["se"]
         hollow = "white" if row["method"] in results["targets"] else INK
@@ -166,11 +169,19 @@ def scale(results: Results) -> Figure:
         axes.plot(ends, [place, place], color=INK, lw=2, zorder=2)
         axes.plot(row["ability"], place, "o", mfc=hollow, mec=INK, ms=6.5, zorder=3)
     axes.axvline(0, color=GREY, lw=1, ls=":", zorder=0)
-    axes.set_yticks(range(len(methods)), [row["method"] for row in methods])
+    axes.set_yticks(range(len(methods)), [textwrap.fill(row["method"], 30) for row in methods])
     axes.set_ylim(len(methods) - 0.5, -0.5)
     axes.set_xlabel("ability (log odds, relative to the mean method)")
     _bare_left(axes)
     return figure
+
+
+def _label(name: str, detail: str) -> str:
+    """A name on at most two lines, and a detail in brackets below it."""
+    lines = textwrap.wrap(name, 26, max_lines=2, placeholder=" …") or [name]
+    if len(lines) == 1 and len(name) + len(detail) < 26:
+        return f"{name}  ({detail})"
+    return "\n".join([*lines, f"({detail})"])
 
 
 def _stacks(rates: list[float]) -> dict[float, int]:
@@ -190,14 +201,14 @@ def _share_axis(axes: Axes, label: str) -> None:
 
 
 def _bare_left(axes: Axes) -> None:
-    axes.tick_params(axis="y", length=0)
+    axes.tick_params(axis="y", length=0, pad=7)
     axes.spines["left"].set_visible(False)
 
 
 def _canvas(width: float, height: float) -> tuple[Figure, Axes]:
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height))
+    figure = Figure(figsize=(width, height), layout="constrained")
     return figure, figure.add_subplot()
 
 
@@ -217,7 +228,7 @@ def _watermark(figure: Figure, mark: str) -> None:
         0.5, 0.5, mark, ha="center", va="center", rotation=12, fontsize=26, color=SECOND,
         alpha=0.13, zorder=0,
     )  # fmt: skip
-    figure.text(0.995, 0.995, mark, ha="right", va="top", fontsize=7, color=SECOND)
+    figure.text(0.995, 1.005, mark, ha="right", va="bottom", fontsize=7, color=SECOND)
 
 
 def _encode(figure: Figure, kind: str) -> bytes:

@@ -74,9 +74,16 @@ def _shown(row: Preference) -> dict[str, str]:
         "odds": display.fixed(row.odds, 2),
         "cohen_h": display.fixed(row.cohen_h, 2),
         "jod": display.fixed(row.jod, 2),
-        "posterior_above_half": display.fixed(row.posterior_above_half, 4),
+        "posterior_above_half": _certainty(row.posterior_above_half),
         "answers_per_stimulus": _exposure(row.answers_per_stimulus),
     }
+
+
+def _certainty(value: float | None) -> str:
+    """A probability that never claims to be one."""
+    if value is None or 0.0001 <= value <= 0.9999:
+        return display.fixed(value, 4)
+    return ">0.9999" if value > 0.5 else "<0.0001"
 
 
 def _exposure(values: tuple[int, float, int]) -> str:

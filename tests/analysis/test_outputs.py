@@ -244,6 +244,12 @@ def test_both_ways_of_starting_end_with_one_line_on_bad_input(
     assert not (tmp_path / "out").exists()
 
 
+def test_help_loads_no_numerical_library() -> None:
+    heavy = "{'numpy', 'pandas', 'scipy', 'matplotlib', 'statsmodels'}"
+    code = f"import sys, analysis.cli; sys.exit(len({heavy} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+
+
 def test_results_of_another_schema_are_refused(tmp_path: Path) -> None:
     (tmp_path / "results.json").write_text('{"schema_version": 99}')
     with pytest.raises(InputError, match="schema_version: got 99"):
