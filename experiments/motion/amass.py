@@ -42,7 +42,7 @@ def read_amass(path: Path) -> Capture:
 
 def _load(path: Path) -> dict[str, Any]:
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files if _is_wanted(name)}
     except FileNotFoundError:
         raise InputError(path, "file", "missing", "an existing AMASS .npz") from None

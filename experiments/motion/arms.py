@@ -30,7 +30,7 @@ _TRUNK_FOLLOW = 0.3
 _RHYTHM_SHARE, _RHYTHM_FROM_DEG = 0.28, 40.0
 """Scapulohumeral rhythm: the collar rises with the arm once the arm is well up (Inman 1944)."""
 _SOFT_M = 0.03
-_RIDE_ALONG = 0.66
+_RIDE_ALONG = 0.74
 _RIDE_ABOVE_M = 0.034
 _RIDE_INWARD_DEG = 12.0
 

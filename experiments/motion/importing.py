@@ -59,7 +59,7 @@ def adapt(capture: Capture, figure: Figure) -> Motion:
 
 def _is_ours(path: Path) -> bool:
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             return "schema_version" in archive.files
     except Exception:
         # a missing or damaged file: the reader it goes to says so

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import metadata
 from pathlib import Path
 
@@ -37,12 +38,30 @@ class MotionSpec:
     seat_height: float | None = None
     """Height of the seat or bed the clip was authored for, metres."""
     surface_height: float | None = None
-    """Height of the table top or shelf that the hands go to, metres."""
+    """Height of the table top or shelf that the hands go to, metres (reach_high: on male_slim)."""
+    recording: Path | None = None
+    """The file it is read from, where that is outside the project and its packages."""
 
 
 def default_motions() -> tuple[MotionSpec, ...]:
     """The motions every installation has, in a fixed order: pybullet's clips and authored ones only."""
     return _DEFAULT
+
+
+def extra_motions() -> tuple[MotionSpec, ...]:
+    """Motions from CMU's recordings, where the folder `PACE_SHARED` (default `../shared`) has them."""
+    folder = Path(os.environ.get("PACE_SHARED") or _ROOT.parent / "shared") / "data" / "cmu"
+    specs = []
+    for name, label, seconds, contact in _CMU:
+        path = folder / name.split("_")[0] / f"{name}.amc"
+        if path.is_file():
+            build = partial(recipes.recorded, path, seconds)
+            source = f"CMU motion capture {name} (mocap.cs.cmu.edu, NSF EIA-0196217)"
+            middle = (seconds[1] - seconds[0]) / 2
+            specs.append(
+                MotionSpec(f"cmu_{name}", label, source, build, middle, contact, recording=path)
+            )
+    return tuple(specs)
 
 
 def load_motion(motion_id: str, body_name: str = "male_slim") -> Motion:
@@ -51,7 +70,7 @@ def load_motion(motion_id: str, body_name: str = "male_slim") -> Motion:
     Raises `InputError` for an unknown motion or body.
     """
     spec = find_spec(motion_id)
-    target = cache_path("motions", _recipe_hash(spec.motion_id, body_name), ".npz")
+    target = cache_path("motions", _recipe_hash(spec.motion_id, body_name, spec.recording), ".npz")
     if not target.is_file():
         motion = spec.build(figure_of(body_name))
         named = dataclasses.replace(
@@ -63,10 +82,11 @@ def load_motion(motion_id: str, body_name: str = "male_slim") -> Motion:
 
 def find_spec(motion_id: str) -> MotionSpec:
     """The entry of that name. Raises `InputError` listing the names there are."""
-    for spec in _DEFAULT:
+    specs = (*_DEFAULT, *extra_motions())
+    for spec in specs:
         if spec.motion_id == motion_id:
             return spec
-    names = ", ".join(spec.motion_id for spec in _DEFAULT)
+    names = ", ".join(spec.motion_id for spec in specs)
     raise InputError("motion library", "motion", motion_id, f"one of {names}")
 
 
@@ -89,12 +109,22 @@ def trim(motion: Motion, seconds: float) -> Motion:
 
 
 @lru_cache(maxsize=64)
-def _recipe_hash(motion_id: str, body_name: str) -> str:
+def _recipe_hash(motion_id: str, body_name: str, recording: Path | None) -> str:
     """Changes with the code that builds motions, the body file and the package the steps come from."""
+    read = file_sha256(recording) if recording else ""
     code = {path.name: file_sha256(path) for path in sorted(Path(__file__).parent.glob("*.py"))}
     versions = {name: metadata.version(name) for name in ("pybullet", "scipy", "numpy")}
-    return value_sha256([motion_id, body_name, code, file_sha256(BODY_FILE), versions])
+    return value_sha256([motion_id, body_name, read, code, file_sha256(BODY_FILE), versions])
 
+
+_ROOT = Path(__file__).resolve().parents[2]
+_CMU: tuple[tuple[str, str, tuple[float, float], tuple[str, ...]], ...] = (
+    ("02_01", "walk (recorded)", (0.0, 2.8), ("floor",)),
+    ("02_02", "walk briskly (recorded)", (0.0, 2.4), ("floor",)),
+    ("02_06", "bend, scoop up, rise (recorded)", (0.0, 5.0), ("objects", "floor")),
+    ("02_10", "wash oneself (recorded)", (0.0, 8.0), ("floor",)),
+)
+"""Recording, label, part (s), contact."""
 
 _SEAT = ("chair", "sofa", "stool", "seating")
 

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.motion.figure import SIDES, Figure
+from experiments.body.measures import SEAT_PRESS_M
+from experiments.motion.figure import SIDES, Figure, surface
+from experiments.motion.perform import perform
 from experiments.motion.score import Score
 
 
@@ -29,13 +31,29 @@ BED = Seat(0.50, feet_forward=0.02, recline=6.0, slump=15.0)
 
 
 def seated_hip(figure: Figure, seat: Seat) -> tuple[float, float]:
-    """How far behind the ankles (m) and how high the hip centre is on this seat."""
-    thigh, shank = figure.leg
+    """How far behind the ankles (m) and how high the hip centre is on this seat.
+
+    Measured on the skin of the seated body, which presses a little into the seat."""
     height = seat.height + figure.seat_offset
+    for _ in range(2):
+        height += seat.height - SEAT_PRESS_M - _lowest_seated(figure, seat, height)
+    return _behind_ankles(figure, seat, height), height
+
+
+def _lowest_seated(figure: Figure, seat: Seat, height: float) -> float:
+    """Height of the lowest point of the buttocks with the hip centre at this height."""
+    score = Score(figure, beat=0.1)
+    _start_seated(score, seat, _behind_ankles(figure, seat, height), height)
+    still = perform(score, "", seed=0, life=0.0)
+    return float(surface(figure, still, figure.body.regions["buttocks"])[0, :, 2].min())
+
+
+def _behind_ankles(figure: Figure, seat: Seat, height: float) -> float:
+    thigh, shank = figure.leg
     lean = np.arcsin(np.clip(seat.feet_forward / shank, -0.9, 0.9))
     knee_height = figure.ankle_height + shank * np.cos(lean)
     rise = float(np.clip(knee_height - height, -0.9 * thigh, 0.9 * thigh))
-    return float(seat.feet_forward + np.sqrt(thigh**2 - rise**2)), height
+    return float(seat.feet_forward + np.sqrt(thigh**2 - rise**2))
 
 
 def sit_down(score: Score, seat: Seat) -> None:
@@ -83,12 +101,12 @@ def stand_up(score: Score, forward: float = 0.0) -> None:
         (1.65, (x - 0.006, over + 0.02, standing - 0.012)),
         (2.15, (x, over, standing)),
     )
-    score.put("pitch", (0.32, 12.0), (0.72, 31.0), (1.15, 25.0), (1.75, 6.0), (2.25, 2.0))
-    score.put("flex", (0.36, 22.0), (0.80, 27.0), (1.25, 18.0), (1.85, 5.0), (2.35, 4.0))
+    score.put("pitch", (0.32, 12.0), (0.72, 29.0), (1.15, 24.0), (1.75, 6.0), (2.25, 2.0))
+    score.put("flex", (0.36, 16.0), (0.80, 17.0), (1.25, 13.0), (1.85, 5.0), (2.35, 4.0))
     score.put("roll", (0.8, -1.5), (1.4, 1.0), (2.2, 0.0))
     score.put("twist", (0.9, 2.5), (1.7, -1.5), (2.3, 0.0))
     score.both("splay", (0.8, 8.0), (1.9, 3.0), lag=0.08)
-    score.both("reach", (0.72, 1.0), (1.45, 0.0), lag=0.1)
+    score.both("reach", (0.22, 1.0), (1.15, 0.0), lag=0.1)
     score.both("hang", (1.0, (12.0, 10.0, 30.0, 22.0)), (1.75, (8.5, -2.0, 13.0, 16.0)),
                (2.45, (9.0, 3.0, 17.0, 18.0)), lag=0.07)  # fmt: skip
     score.both("swivel", (1.8, 24.0))
@@ -120,6 +138,10 @@ def sit_and_look(score: Score, seconds: float, side: float = 1.0) -> None:
 def be_seated(score: Score, seat: Seat) -> None:
     """Begin the score seated, hands on the thighs."""
     depth, height = seated_hip(score.figure, seat)
+    _start_seated(score, seat, depth, height)
+
+
+def _start_seated(score: Score, seat: Seat, depth: float, height: float) -> None:
     score.start("hip", 0.0, depth + 0.02, height)
     score.start("pitch", -seat.recline)
     score.start("flex", seat.slump)
@@ -175,7 +197,7 @@ def gather_hands(score: Score) -> None:
 def work_at_table(score: Score, height: float, seconds: float, rng: np.random.Generator) -> None:
     """Seated: hands to a table top, type, look up to one side, type, sit back."""
     y = score.last("hip")[1]
-    front, t = y - 0.41, seconds
+    front, t = y - 0.46, seconds
     score.put("gaze", (0.4, (30.0, 3.0)), (0.30 * t, (33.0, -4.0)), (0.36 * t, (8.0, 20.0)),
               (0.48 * t, (6.0, 24.0)), (0.54 * t, (32.0, 2.0)), (0.76 * t, (34.0, -2.0)),
               (0.84 * t, (4.0, -9.0)), (t, (8.0, -3.0)))  # fmt: skip
@@ -187,7 +209,7 @@ def work_at_table(score: Score, height: float, seconds: float, rng: np.random.Ge
     for sign, side in ((1.0, "left"), (-1.0, "right")):
         lag = 0.12 if side == "left" else 0.0
         place = np.array([0.11 * sign, front, height + 0.045])
-        lifted = place + np.array([0.04 * sign, 0.06, 0.05])
+        lifted = place + np.array([0.03 * sign, 0.02, 0.05])
         score.start(f"{side}_hand", *lifted)
         score.start(f"{side}_palm_frame", 16.0 * -sign, 0.0, 0.0)
         keys = [(0.75 + lag, tuple(lifted)), (1.1 + lag, tuple(place))]

@@ -54,7 +54,7 @@ def reach_for(
     x, y, z = score.last("hip")
     goal = ((0.13 + 0.10 * max(0.0, height - 1.45)) * sign, y - distance, height)
     chest = score.figure.shoulder_height - 0.12
-    near = (0.22 * sign, y - max(0.66 * distance, 0.38), min(height - 0.12, chest))
+    near = (0.22 * sign, y - max(0.66 * distance, 0.50), min(height - 0.12, chest))
     up = max(0.0, height - 1.45)
     # On the toes the ankles rise by the way from toe joint to ankle times the sine of the lift.
     rise = float(np.sin(np.radians(tiptoe))) * float(np.linalg.norm(score.figure.ball[1:]))

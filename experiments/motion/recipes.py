@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 
+from experiments.motion.amc import read_amc
+from experiments.motion.cleanup import clean_recording
 from experiments.motion.compose import join
 from experiments.motion.deepmimic import pybullet_clip, read_deepmimic
 from experiments.motion.figure import Figure
@@ -19,6 +22,7 @@ from experiments.motion.gait import (
     walk_within,
 )
 from experiments.motion.ground import rest_on_floor
+from experiments.motion.importing import adapt
 from experiments.motion.motion import Motion
 from experiments.motion.perform import perform
 from experiments.motion.phrases_lie import get_up, lie_down, rest
@@ -215,3 +219,10 @@ def floor_get_up(figure: Figure) -> Motion:
     # The performer springs up; at four fifths of the pace it is an everyday movement.
     rising = resample(dataclasses.replace(recorded, times=recorded.times * _UNHURRIED))
     return rest_on_floor(join(rising, standing, figure, 10, 18), figure)
+
+
+def recorded(path: Path, seconds: tuple[float, float], figure: Figure) -> Motion:
+    """A part of a CMU recording, cleaned."""
+    motion = adapt(read_amc(path), figure)
+    start, stop = (round(time * motion.fps) for time in seconds)
+    return clean_recording(window(motion, start, min(stop, motion.n_frames)), figure)
