@@ -40,7 +40,7 @@ _SEATS = {"chair": 0.45, "sofa": 0.43, "bed": 0.52, "seating": 0.46, "stool": 0.
 """Classes that people sit on, with the seat height that is usual for them, metres."""
 _HIGH_SEATS = {"stool": 0.74, "counter": 0.9, "table": 0.75}
 _BEDS = ("bed", "sofa", "seating")
-_TOPS = ("table", "cabinet", "counter", "chest_of_drawers", "shelving", "furniture", "appliances")
+_TOPS = ("table", "counter", "chest_of_drawers")
 _FRONTS = ("shelving", "cabinet", "wall", "door", "appliances", "board_panel")
 
 Support = tuple[Bool[np.ndarray, "T V"], tuple[str, ...]]

@@ -52,7 +52,7 @@ def fault(problem: Problem, fit: Fit) -> str:
         rigid = Starts(np.array([fit.yaw]), fit.translation[None], np.zeros(1))
         match = float(class_match(problem, rigid)[0])
         if match < settings.start_filter:
-            expected = ", ".join(["floor", *problem.expected_classes()])
+            expected = ", ".join(problem.expected_classes(floor=True))
             return f"touches what it expects ({expected}) with {match:.0%} of its contacts only"
     return ""
 

@@ -102,7 +102,7 @@ def _filtered(problem: Problem, starts: Starts) -> Starts:
     if threshold is not None:
         matching = class_match(problem, starts) >= threshold
         if not matching.any():
-            names = ", ".join(problem.expected_classes())
+            names = ", ".join(problem.expected_classes(floor=True))
             reason = f"no start brings the body to what it expects to touch ({names})"
             raise NoAdmissibleStart(problem.motion.motion_id, problem.scene.scene_id, reason)
         starts = starts.take(matching)

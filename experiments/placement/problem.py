@@ -101,10 +101,10 @@ class Problem(RigidProblem):
         k = torch.as_tensor(weights.values, dtype=self.k.dtype)
         return dataclasses.replace(self, weights=weights, k=k)
 
-    def expected_classes(self) -> list[str]:
-        """Names of the classes that the motion expects to touch, floor left out."""
-        present = torch.unique(self.wanted[self.beyond_floor()]).tolist()
-        return [MPCAT40[index] for index in present]
+    def expected_classes(self, floor: bool = False) -> list[str]:
+        """Names of the classes that the motion expects to touch, with the floor or without."""
+        touching = self.contact if floor else self.beyond_floor()
+        return [MPCAT40[index] for index in torch.unique(self.wanted[touching]).tolist()]
 
 
 def build_problem(

@@ -1,14 +1,16 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
 
 from experiments.methods import METHODS
+from experiments.methods.outcome import best_fit, fault
 from experiments.methods.pace import pace_problem, rigid_fits
 from experiments.metrics import plausibility
-from experiments.placement.errors import NoAdmissibleStart
+from experiments.placement.errors import NoAdmissibleStart, OptimisationFailed
 from experiments.placement.features import choose_features
 from experiments.placement.placement import read_placement, write_placement
 from experiments.placement.problem import build_problem
@@ -103,9 +105,35 @@ def test_a_body_that_can_only_stand_inside_things_is_refused(walk, slim) -> None
     room = synthetic_room(full, scene_id="blocked")
     with pytest.raises(
         NoAdmissibleStart,
-        match=r"motion walk in scene blocked: .* (inside something|contacts only)",
+        match=r"motion walk in scene blocked: no start .* expects to touch \(floor\)",
     ):
         METHODS["posa_t"].place(walk(0.2, 20), room, slim, FAST, 0)
+
+
+def test_a_fit_deep_inside_something_is_refused(sit, slim, seat_room) -> None:
+    problem = pace_problem(sit(20), seat_room, slim, FAST)
+    sound = rigid_fits(problem)[0]
+    sunk = dataclasses.replace(sound, translation=sound.translation - np.array([0.0, 0.0, 0.5]))
+    assert fault(problem, sound) == ""
+    assert "m deep inside something" in fault(problem, sunk)
+    with pytest.raises(NoAdmissibleStart, match=r"at its best start the body is 0\.\d+ m deep"):
+        best_fit(problem, [sunk])
+
+
+def test_hands_and_seats_that_hang_in_the_air_are_refused(sit, slim, seat_room) -> None:
+    problem = pace_problem(sit(20), seat_room, slim, FAST)
+    sound = rigid_fits(problem)[0]
+    above = dataclasses.replace(sound, translation=sound.translation + np.array([0.0, 0.0, 0.3]))
+    assert re.match(
+        r"stays 3\d cm away from what it expects to touch \(chair\)", fault(problem, above)
+    )
+
+
+def test_energies_that_are_not_finite_are_no_placement(sit, slim, seat_room) -> None:
+    problem = pace_problem(sit(20), seat_room, slim, FAST)
+    broken = dataclasses.replace(rigid_fits(problem)[0], terms={"contact": float("nan")})
+    with pytest.raises(OptimisationFailed, match="motion sit in scene synthetic: no start reached"):
+        best_fit(problem, [broken])
 
 
 def test_an_unknown_interaction_model_is_refused_by_name(sit, slim, seat_room) -> None:
