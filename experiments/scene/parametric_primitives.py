@@ -142,7 +142,9 @@ def sheet(grid: Float[np.ndarray, "N M 3"], thickness: float) -> Triangles:
     return np.concatenate([surface(front), surface(back)[:, ::-1]])
 
 
-def turned(corners: Triangles, axis: str, degrees: float | int, about: Vector = (0, 0, 0)) -> Triangles:
+def turned(
+    corners: Triangles, axis: str, degrees: float | int, about: Vector = (0, 0, 0)
+) -> Triangles:
     """Rotate about an axis through a point, counter-clockwise seen from the axis' tip."""
     angle = np.radians(degrees)
     c, s = np.cos(angle), np.sin(angle)
@@ -167,7 +169,9 @@ def surface(grid: Float[np.ndarray, "N M 3"]) -> Triangles:
 
 
 def _power(value: Float[np.ndarray, "N M"], exponent: float) -> Float[np.ndarray, "N M"]:
-    return np.asarray(np.sign(value) * np.abs(value) ** exponent)
+    """Signed power; a sine that should be zero must not grow into a crack along the seam."""
+    size = np.where(np.abs(value) < 1e-12, 0.0, np.abs(value))
+    return np.asarray(np.sign(value) * size**exponent)
 
 
 def _bevelled(half: Float[np.ndarray, " 3"], bevel: float) -> Triangles:

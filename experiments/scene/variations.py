@@ -102,8 +102,9 @@ def _changed(base: Layout, rng: np.random.Generator, pack: Pack) -> dict[str, It
     for item in base.items:
         new = item
         if item.piece in stand_ins and item.on is None:
-            new = _exchanged(new, stand_ins[item.piece], pack)
-            new = replace(new, tint=TINTS[int(rng.integers(len(TINTS)))]) if new.seat else new
+            piece, tint = stand_ins[item.piece]
+            new = _exchanged(new, piece, pack)
+            new = replace(new, tint=tint) if new.seat else new
         if _free_standing(item):
             shift = rng.uniform(-_SHIFT, _SHIFT, 2)
             new = replace(
@@ -120,13 +121,14 @@ def _changed(base: Layout, rng: np.random.Generator, pack: Pack) -> dict[str, It
     return changes | _dropped(base, rng)
 
 
-def _stand_ins(base: Layout, rng: np.random.Generator) -> dict[str | None, str]:
-    """One stand-in for every piece that has a family: equal chairs stay equal."""
-    chosen: dict[str | None, str] = {}
+def _stand_ins(base: Layout, rng: np.random.Generator) -> dict[str | None, tuple[str, Colour]]:
+    """One stand-in and tint for every piece that has a family: equal chairs stay equal."""
+    chosen: dict[str | None, tuple[str, Colour]] = {}
     for piece in dict.fromkeys(item.piece for item in base.items):
         for family in FAMILIES:
             if piece in family:
-                chosen[piece] = family[int(rng.integers(len(family)))]
+                tint = TINTS[int(rng.integers(len(TINTS)))]
+                chosen[piece] = family[int(rng.integers(len(family)))], tint
     return chosen
 
 

@@ -36,6 +36,20 @@ def test_a_primitive_is_closed_faces_outwards_and_has_its_textbook_volume(name):
     assert volume(corners) == pytest.approx(wanted, rel=2e-3)
 
 
+@pytest.mark.parametrize("name", [*SOLIDS, "block", "bevelled"])
+def test_a_primitive_has_no_cracks(name):
+    more = {
+        "block": (superellipsoid((0.45, 0.54, 0.11), flat=0.18, square=0.18, n=16), 0),
+        "bevelled": (box((0.4, 0.3, 0.2), bevel=0.02), 0),
+    }
+    corners, _ = (SOLIDS | more)[name]
+    vertex = np.unique(np.round(corners.reshape(-1, 3), 9), axis=0, return_inverse=True)[1]
+    faces = vertex.reshape(-1, 3)
+    edges = {(int(f[k]), int(f[(k + 1) % 3])) for f in faces for k in range(3)}
+    assert len(edges) == 3 * len(faces)
+    assert {(b, a) for a, b in edges} == edges
+
+
 @given(st.tuples(*[st.floats(0.05, 2.0)] * 3), st.floats(0.001, 0.1))
 @settings(deadline=None, max_examples=40)
 def test_a_bevel_keeps_the_size_of_a_box_and_takes_a_little_volume(size, bevel):
