@@ -40,20 +40,26 @@ def lock_participant(session: Session, participant_id: int) -> Participant:
 def bind_next(
     session: Session, participant_id: int, now: datetime, window: int, lease: timedelta
 ) -> bool:
-    """Bind the first seat inside the window that has no living lease; False when all have one.
+    """Bind the first seat inside the window that has no living lease; True if another one waits.
 
     One seat a transaction, so that no two transactions ever wait for each other's cells.
     """
     participant = lock_participant(session, participant_id)
-    for trial in seats_ahead(participant)[:window]:
-        if trial.state in OPEN_STATES and trial.lease_expires_at and trial.lease_expires_at > now:
-            continue
-        _bind(session, participant, trial, now)
-        if trial.state != "void":
-            trial.state = "leased" if trial.shown_at is None else "shown"
-            trial.lease_expires_at = now + lease
-        return True
-    return False
+    waiting = [trial for trial in seats_ahead(participant)[:window] if not _is_leased(trial, now)]
+    if waiting:
+        _bind(session, participant, waiting[0], now)
+        if waiting[0].state != "void":
+            waiting[0].state = "leased" if waiting[0].shown_at is None else "shown"
+            waiting[0].lease_expires_at = now + lease
+    return len(waiting) > 1 or any(trial.state == "void" for trial in waiting)
+
+
+def _is_leased(trial: Trial, now: datetime) -> bool:
+    return (
+        trial.state in OPEN_STATES
+        and trial.lease_expires_at is not None
+        and trial.lease_expires_at > now
+    )
 
 
 def seats_ahead(participant: Participant) -> list[Trial]:
@@ -64,7 +70,7 @@ def seats_ahead(participant: Participant) -> list[Trial]:
 def renew_leases(participant: Participant, now: datetime, lease: timedelta) -> None:
     """Any sign of life keeps all living leases of a person alive."""
     for trial in participant.trials:
-        if trial.state in OPEN_STATES and trial.lease_expires_at and trial.lease_expires_at > now:
+        if _is_leased(trial, now):
             trial.lease_expires_at = now + lease
 
 

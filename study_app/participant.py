@@ -133,7 +133,11 @@ def session_page(study_id: str) -> ResponseReturnValue:
     if token is None:
         return redirect(url_for(".landing", study_id=study_id), 303)
     with here.database.read() as db:
-        person = services.find_participant(db, token, study_id)
+        try:
+            person = services.find_participant(db, token, study_id)
+        except Refused:  # deleted meanwhile: begin anew
+            forget(study_id)
+            return redirect(url_for(".landing", study_id=study_id), 303)
         if person.version.state == "closed" and person.state != "finished":
             raise Refused("closed")
         page, person_id = progress_of(person).page, person.id
