@@ -28,6 +28,8 @@ LEVEL = 0.95
 MAX_DOTS = 500
 """Most participants whose single rates are kept for the dot plot."""
 MAX_DIFFERENCES = 15
+LARGEST_SD = 8.0
+"""Standard deviations beyond this (log odds) mean that the mixed model ran towards infinity."""
 
 
 def estimate(
@@ -93,7 +95,7 @@ def _preference(
         why = can_fit(one.cells)
         fit = None if why else fit_crossed(one.cells)
         row["mixed_model"] = _mixed(fit, why)
-        row |= _by_scene(analysed, one, fit)
+        row |= _by_scene(analysed, one, fit if "rate" in row["mixed_model"] else None)
         rows[one.name] = row
     return {
         "order": sorted(table, key=lambda name: (-table[name].rate, name)),
@@ -104,8 +106,10 @@ def _preference(
 def _mixed(fit: MixedFit | None, why: str) -> dict[str, Any]:
     if fit is None:
         return {"why": why}
+    if not fit.converged or max(fit.sd_participant, fit.sd_stimulus) > LARGEST_SD:
+        return {"why": "no clear maximum, answers are nearly separated by participant or stimulus"}
     rate = asdict(mixed_rate(fit, LEVEL))
-    return rate | {"ci": list(rate["ci"]), "why": "" if fit.converged else "did not converge"}
+    return rate | {"ci": list(rate["ci"]), "why": ""}
 
 
 def _draws(analysed: Responses, found: list[Comparison], seed: int, bootstraps: int) -> np.ndarray:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy import linalg, optimize, stats
+from scipy import linalg, optimize, special, stats
 
 from analysis.cells import Cells
 
@@ -32,7 +32,7 @@ class MixedFit:
     beta: Float[np.ndarray, "B"]
     """Fixed effects, log odds."""
     se: Float[np.ndarray, "B"]
-    """Their standard errors, from the Hessian over all parameters as in lme4."""
+    """Their standard errors, from the Hessian over all parameters as in lme4; infinite without a maximum."""
     sd_participant: float
     sd_stimulus: float
     log_likelihood: float
@@ -64,18 +64,20 @@ def fit_crossed(cells: Cells, design: Float[np.ndarray, "C B"] | None = None) ->
     first, second = (model.modes[0], model.modes[1])
     if model.swapped:
         spread, first, second = spread[::-1], second, first
+    spreads = np.diag(covariance)[: model.fixed]
+    definite = bool((spreads > 0).all())
     return MixedFit(
-        beta=beta, se=np.sqrt(np.diag(covariance)[: model.fixed]), sd_participant=float(spread[0]),
+        beta=beta, se=np.sqrt(np.where(spreads > 0, spreads, np.inf)), sd_participant=float(spread[0]),
         sd_stimulus=float(spread[1]), log_likelihood=-deviance / 2,
         mode_participant=spread[0] * first, mode_stimulus=spread[1] * second,
-        converged=bool(np.abs(gradient).max() < 0.05),
+        converged=definite and bool(np.abs(gradient).max() < 0.05),
     )  # fmt: skip
 
 
 def marginal_rate(logit: float, variance: float) -> float:
     """Mean of expit(logit + N(0, variance)): the rate over people and stimuli (Gauss-Hermite)."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(61)
-    values = 1 / (1 + np.exp(-(logit + math.sqrt(variance) * nodes)))
+    values = special.expit(logit + math.sqrt(variance) * nodes)
     return float(weights @ values / weights.sum())
 
 
@@ -138,7 +140,7 @@ class _Laplace:
         """Logistic regression without random effects, a few Newton steps from zero."""
         beta = np.zeros(self.fixed)
         for _ in range(12):
-            rate = _expit(self.design @ beta)
+            rate = special.expit(self.design @ beta)
             weight = self.n * rate * (1 - rate) + 1e-9
             step = self.design.T @ (self.k - self.n * rate)
             hessian = (self.design.T * weight) @ self.design + 1e-6 * np.eye(self.fixed)
@@ -180,7 +182,7 @@ class _Laplace:
         u: Float[np.ndarray, "P"], v: Float[np.ndarray, "S"],
     ) -> tuple[Float[np.ndarray, "P"], Float[np.ndarray, "S"], float]:  # fmt: skip
         """Newton step of the spherical random effects and log |Hessian|, by Schur complement."""
-        rate = _expit(eta)
+        rate = special.expit(eta)
         residual, weight = self.k - self.n * rate, self.n * rate * (1 - rate)
         (rows, columns), (a, b) = self.sizes, sds
         grad_u = a * np.bincount(self.big, residual, rows) - u
@@ -252,7 +254,3 @@ def _derivatives(
             hessian[i, j] = hessian[j, i] = mixed / (2 * h**2)
     gradient = np.array([(p - m) / (2 * h) for p, m in zip(up, down, strict=True)])
     return gradient, hessian
-
-
-def _expit(values: Float[np.ndarray, "C"]) -> Float[np.ndarray, "C"]:
-    return np.asarray(0.5 * (1 + np.tanh(values / 2)))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy import optimize, stats
+from scipy import optimize, special, stats
 
 from analysis.binomial import holm, wilson
 from analysis.cells import Cells, count_cells
@@ -104,7 +104,7 @@ def rater_design_effect(answers: int, sd_participant: float, rate: float = 0.5) 
     """1 + (answers - 1) ICC from participants alone; ICC of the binary answers by integration."""
     centre = _centre(rate, sd_participant, 0.0)
     nodes, weights = np.polynomial.hermite_e.hermegauss(61)
-    p = 1 / (1 + np.exp(-(centre + sd_participant * nodes)))
+    p = special.expit(centre + sd_participant * nodes)
     mean = float(weights @ p / weights.sum())
     between = float(weights @ (p - mean) ** 2 / weights.sum())
     return 1 + (answers - 1) * between / (mean * (1 - mean))
@@ -124,7 +124,7 @@ def simulate_cells(
         shown = np.argsort(rng.random((count, plan.pool)), axis=1)[:, : plan.answers]
     who = np.repeat(np.arange(count), plan.answers)
     eta = logit + people[who] + stimuli[shown.ravel()]
-    return count_cells(who, shown.ravel(), rng.random(len(who)) < 1 / (1 + np.exp(-eta)))
+    return count_cells(who, shown.ravel(), rng.random(len(who)) < special.expit(eta))
 
 
 def plan_table(plan: Plan, forecasts: list[Forecast]) -> str:

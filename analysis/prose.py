@@ -15,7 +15,7 @@ def methods_paragraph(results: Results) -> str:
     sentences = [
         f"{holding(flow['analysed_participants'], 'participant')} gave "
         f"{holding(flow['analysed'], 'answer')} in a "
-        f"two-alternative forced choice between {_list(results['targets'])} and "
+        f"two-alternative forced choice between {_list(results['targets'])} and each of "
         f"{_list(_baselines(results))}.",
         _exclusion_sentence(results),
         "For each comparison we report the share of answers in favour of the target with a "
@@ -78,7 +78,7 @@ def results_paragraph(results: Results) -> str:
         shown, test = row["display"], f"p = {row['display']['p_holm']}".replace("= <", "< ")
         verdict = "" if row["p_holm"] < 1 - results["level"] else "; not distinguishable from 50 %"
         sentences.append(
-            f"{row['target']} was chosen over {row['baseline']} in {shown['rate']} % of "
+            f"Against {row['baseline']}, {row['target']} was chosen in {shown['rate']} % of "
             f"{holding(row['n'], 'answer')} "
             f"[{shown['ci']}], {test}{verdict}."
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy import stats
+from scipy import special, stats
 
 from analysis.cells import Cells
 from analysis.clustered import clustered_rate
@@ -56,7 +56,7 @@ def leave_one_out(cells: Cells, level: float = 0.95) -> Float[np.ndarray, "P 3"]
         df = groups[:2].min(axis=0) - 1
         half = stats.t.ppf(0.5 + level / 2, df) * np.sqrt(variance)
         centre = np.log(wins / (answers - wins))
-        bounds = 1 / (1 + np.exp(-np.column_stack([centre - half, centre + half])))
+        bounds = special.expit(np.column_stack([centre - half, centre + half]))
     result = np.column_stack([rate, bounds])
     odd = ~usable | ~np.isfinite(result).all(axis=1) | ~(variance > 1e-12) | (df < 1)
     for person in np.flatnonzero(odd):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy import stats
+from scipy import special, stats
 
 from analysis.binomial import wilson
 from analysis.cells import Cells
@@ -81,7 +81,7 @@ def per_stimulus(cells: Cells, labels: list[str], fit: MixedFit | None) -> list[
     )
     pooled = None
     if fit is not None:
-        pooled = 1 / (1 + np.exp(-(fit.beta[0] + fit.mode_stimulus)))
+        pooled = special.expit(fit.beta[0] + fit.mode_stimulus)
     records = []
     for index, label in enumerate(labels):
         k, n = int(wins[index]), int(answers[index])

@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -123,6 +124,35 @@ def test_odd_studies_give_flagged_finite_tables(
     pages = [markdown_report(results), html_report(results, {}), latex.preference_tex(results)]
     for page in [*pages, *tables.all_csv(results).values()]:
         assert not re.search(r"\b(nan|inf|None)\b", page)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_random_small_studies_are_finite_everywhere(
+    seed: int, tmp_path: Path, make_answers: Callable, make_row: Callable
+) -> None:
+    """One-sided people, separated or disconnected methods, unbalanced clips, a target always first."""
+    rng = np.random.default_rng(seed)
+    people, clips, methods = (int(rng.integers(1, high)) for high in (7, 6, 4))
+    taste, star, always_first = (
+        rng.normal(0, [0, 3, 20][seed % 3], people),
+        seed % 2 == 0,
+        seed % 5 == 0,
+    )
+    rows = []
+    for person in range(people):
+        for trial in range(int(rng.integers(1, 14))):
+            target = 0 if star else int(rng.integers(methods + 1))
+            baseline = (target + 1 + int(rng.integers(methods))) % (methods + 1)
+            rows.append(make_row(
+                participant=f"P{person}", trial_index=trial + 1, target=f"m{target}", baseline=f"m{baseline}",
+                scene=f"s{rng.integers(2)}", motion=f"c{rng.integers(clips)}",
+                won=bool(rng.random() < 1 / (1 + math.exp(-taste[person]))),
+                target_first=always_first or bool(rng.random() < 0.5),
+            ))  # fmt: skip
+    results = estimate(make_answers(tmp_path / "r.csv", rows), bootstraps=100)
+    assert all(math.isfinite(value) for value in _numbers(results))
+    page = markdown_report(results)
+    assert not re.search(r"\b(nan|inf|None)\b", page)
 
 
 def test_a_study_of_one_answer_is_drawn_without_complaint(
