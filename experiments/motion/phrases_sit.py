@@ -195,13 +195,13 @@ def gather_hands(score: Score) -> None:
 
 
 def work_at_table(score: Score, height: float, seconds: float, rng: np.random.Generator) -> None:
-    """Seated: hands to a table top, type, look up to one side, type, sit back."""
+    """Seated, hands on a table top: type, look up to one side, type, sit back a little."""
     y = score.last("hip")[1]
     front, t = y - 0.46, seconds
     score.put("gaze", (0.4, (30.0, 3.0)), (0.30 * t, (33.0, -4.0)), (0.36 * t, (8.0, 20.0)),
               (0.48 * t, (6.0, 24.0)), (0.54 * t, (32.0, 2.0)), (0.76 * t, (34.0, -2.0)),
               (0.84 * t, (4.0, -9.0)), (t, (8.0, -3.0)))  # fmt: skip
-    score.put("pitch", (0.8, 2.0), (0.76 * t, 3.0), (0.9 * t, -8.0))
+    score.put("pitch", (0.8, 2.0), (0.76 * t, 3.0), (0.9 * t, -3.0))
     score.put(
         "flex", (0.8, 20.0), (0.4 * t, 17.0), (0.6 * t, 21.0), (0.76 * t, 22.0), (0.92 * t, 14.0)
     )
@@ -209,24 +209,15 @@ def work_at_table(score: Score, height: float, seconds: float, rng: np.random.Ge
     for sign, side in ((1.0, "left"), (-1.0, "right")):
         lag = 0.12 if side == "left" else 0.0
         place = np.array([0.11 * sign, front, height + 0.045])
-        lifted = place + np.array([0.03 * sign, 0.02, 0.05])
-        score.start(f"{side}_hand", *lifted)
+        # From the lap the hands would have to come up through the table: they are on it throughout.
+        score.start(f"{side}_hand", *place)
+        score.start(f"{side}_ride", 0.0)
+        score.start(f"{side}_palm", 0.9)
         score.start(f"{side}_palm_frame", 16.0 * -sign, 0.0, 0.0)
-        keys = [(0.75 + lag, tuple(lifted)), (1.1 + lag, tuple(place))]
-        score.put(f"{side}_hand", *keys, *_typing(1.3 + lag, 0.34 * t, place, rng),
+        score.put(f"{side}_hand", (0.5 + lag, tuple(place)), *_typing(0.8 + lag, 0.34 * t, place, rng),
                   (0.38 * t + lag, tuple(place)), (0.5 * t + lag, tuple(place)),
-                  *_typing(0.55 * t + lag, 0.76 * t, place, rng),
-                  (0.8 * t + lag, tuple(lifted)))  # fmt: skip
-        score.put(
-            f"{side}_ride",
-            (0.1 + lag, 1.0),
-            (0.75 + lag, 0.0),
-            (0.79 * t + lag, 0.0),
-            (0.9 * t + lag, 1.0),
-        )
-        score.put(
-            f"{side}_palm", (0.5 + lag, 0.0), (1.0 + lag, 0.9), (0.8 * t, 0.9), (0.9 * t, 0.0)
-        )
+                  *_typing(0.55 * t + lag, 0.76 * t, place, rng), (0.8 * t + lag, tuple(place)),
+                  (0.92 * t + lag, tuple(place + np.array([0.03 * sign, 0.03, 0.0]))))  # fmt: skip
     score.wait(seconds)
 
 
