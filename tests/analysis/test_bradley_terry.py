@@ -94,6 +94,23 @@ def test_a_25_method_light_field_scale_equals_bradleyterry2(
     assert scale.log_likelihood == pytest.approx(wanted["loglik"], abs=1e-6)
 
 
+@pytest.mark.shared
+def test_sharpened_images_equal_sureal_within_each_content(
+    shared_data: Path, expected: dict
+) -> None:
+    """sureal fixes one sum over all contents, never compared; differences within are free of it."""
+    data = pd.read_csv(shared_data / "analysis" / "krasula_sharpened_pc.csv")
+    one = np.ones(len(data), dtype=int)
+    duels = Duels(data.asset.to_numpy(), data.opponent.to_numpy(), one, one)
+    assert describe_graph(duels, 40).components == 5
+    for content in range(5):
+        mine = data[data.content_id == content]
+        first, second = mine.asset.to_numpy() - 8 * content, mine.opponent.to_numpy() - 8 * content
+        scale = fit_scale(Duels(first, second, one[: len(mine)], one[: len(mine)]), 8)
+        q = np.array(expected["krasula_sureal"]["q"][8 * content : 8 * content + 8])
+        assert scale.ability - scale.ability.mean() == pytest.approx(q - q.mean(), abs=1e-5)
+
+
 def test_two_methods_give_the_log_odds() -> None:
     duels = Duels(np.array([1]), np.array([0]), np.array([30]), np.array([40]))
     scale = fit_scale(duels, 2)
