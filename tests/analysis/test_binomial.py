@@ -17,7 +17,7 @@ from analysis import binomial
 def test_intervals_and_tests_equal_r(shared_data: Path) -> None:
     # R: prop.test(k, n, correct = FALSE), binom.test(k, n)
     expected = json.loads((shared_data / "analysis" / "expected.json").read_text())
-    for case in expected["binom"]:
+    for case in [*expected["binom"], expected["tmo_sidebias"], expected["lf_sidebias"]]:
         k, n = case["k"], case["n"]
         assert binomial.wilson(k, n) == pytest.approx(case["wilson"], abs=1e-9)
         assert binomial.exact(k, n) == pytest.approx(case["cp"], abs=1e-9)
