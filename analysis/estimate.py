@@ -169,12 +169,12 @@ def _scene_of_stimuli(
 
 
 def _quality(analysed: Responses, found: list[Comparison]) -> dict[str, Any]:
-    won = np.zeros(len(analysed), dtype=bool)
+    won, expected = np.zeros(len(analysed), dtype=bool), np.zeros(len(analysed))
     for one in found:
-        won[one.rows] = one.won
+        won[one.rows], expected[one.rows] = one.won, one.won.mean()
     return {
         "side_bias": quality.side_bias(analysed, LEVEL),
-        "order_drift": quality.order_drift(analysed, won),
+        "order_drift": quality.order_drift(analysed, won, expected),
         "exposure": quality.exposure(analysed, found),
         "times": quality.response_times(analysed), "viewing": quality.viewing(analysed),
     }  # fmt: skip
@@ -291,15 +291,22 @@ def _warnings(results: Results, flow: Flow, codebook: Codebook) -> list[str]:
             f"FEW CLUSTERS: an interval rests on {clusters} participants or stimuli; below "
             f"{FEW_CLUSTERS} it is unreliable."
         )
-    for name, variants in results["sensitivity"].items():
-        for row in variants:
-            if row["flips"]:
-                lines.append(f"FRAGILE: {name}, {row['variant']}: the {row['flips']} changes.")
+    for name in results["order"]:
+        lines += [
+            f"FRAGILE: {name}, {row['variant']}: the {row['flips']} changes."
+            for row in results["sensitivity"][name]
+            if row["flips"] and _matters(results["baselines"][name]["ci"], row["ci"])
+        ]
     if flow.analysed_participants < flow.participants / 2:
         lines.append("More than half of the participants were excluded.")
     if results["scale"]["components"] > 1:
         lines.append("Some methods were never compared, not even indirectly: no common scale.")
     return lines
+
+
+def _matters(reported: list[float], variant: list[float]) -> bool:
+    """A rate near one half may cross it freely; it matters when either interval excludes one half."""
+    return any(low > 0.5 or high < 0.5 for low, high in (reported, variant))
 
 
 def _clusters(results: Results) -> list[int]:

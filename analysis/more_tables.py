@@ -229,7 +229,7 @@ def _side_rows(quality: dict[str, Any]) -> Rows:
     )]  # fmt: skip
     if drift["change"] is not None:
         rows.append((
-            "last − first third of trials", f"{points(drift['change'])} points "
+            "drift, last − first third of trials", f"{points(drift['change'])} points "
             f"[{points_interval(drift['ci'])}]",
             f"paired t over {drift['participants']} participants, p = {p_value(drift['p'])}",
         ))  # fmt: skip

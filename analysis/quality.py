@@ -35,8 +35,15 @@ def side_bias(responses: Responses, level: float = 0.95) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def order_drift(responses: Responses, won: Bool[np.ndarray, "N"]) -> dict[str, Any]:
-    """Rate in the first and the last third of each participant's trials; t test on the differences."""
+def order_drift(
+    responses: Responses, won: Bool[np.ndarray, "N"], expected: Float[np.ndarray, "N"]
+) -> dict[str, Any]:
+    """Does the target rate change from the first to the last third of each participant's trials?
+
+    `expected` is the overall rate of each answer's comparison; it is subtracted, so that comparisons
+    asked in blocks look like no drift. Paired t test over participants.
+    """
+    excess = won - expected
     third = trial_thirds(responses)
     people = responses.codes["participant"]
     count = len(responses.labels["participant"])
@@ -44,7 +51,7 @@ def order_drift(responses: Responses, won: Bool[np.ndarray, "N"]) -> dict[str, A
     for part in (0, 2):
         inside = third == part
         n = np.bincount(people[inside], minlength=count)
-        k = np.bincount(people[inside], won[inside], minlength=count)
+        k = np.bincount(people[inside], excess[inside], minlength=count)
         rates.append(k / np.maximum(n, 1))
         sizes.append(n)
     both = (sizes[0] > 0) & (sizes[1] > 0)

@@ -39,7 +39,10 @@ dt{font-weight:600;margin-top:.6rem}dd{margin:0 0 0 1rem}
 .note,figcaption,footer{font-size:.85rem;color:#4a4a4a}
 figure{margin:1rem 0}figure svg{max-width:100%;height:auto}
 code{font-size:.85em;overflow-wrap:anywhere}
-@media print{body{max-width:none;padding:0}h2,caption{break-after:avoid}table,figure{break-inside:avoid}
+tbody th{min-width:8.5rem}
+@media print{body{max-width:none;padding:0;font-size:11pt}.scroll{overflow:visible}
+table{font-size:8.5pt}.note,figcaption,footer{font-size:8.5pt}th,td{padding:.12rem .25rem}
+tbody th{min-width:0}h2,caption{break-after:avoid}table,figure{break-inside:avoid}
 }
 """
 

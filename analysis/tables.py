@@ -67,12 +67,16 @@ def flow_table(results: Results) -> Table:
     rows += [(f"not analysed: {k} trials", f"−{c:,}", "") for k, c in flow["other_kind"].items()]
     people = flow["excluded_participants"]
     rows += [
-        (f"excluded: {rule}", f"−{count:,}", f"−{people[rule]}" if rule in people else "")
+        (f"excluded: {rule}", _less(count), _less(people[rule]) if rule in people else "")
         for rule, count in flow["excluded_answers"].items()
     ]
     rows.append(("analysed", f"{flow['analysed']:,}", f"{flow['analysed_participants']}"))
     header = ("step", "answers", "participants")
     return Table("flow", "From the file to the analysis", header, tuple(rows))
+
+
+def _less(count: int) -> str:
+    return f"−{count:,}" if count else "0"
 
 
 def all_tables(results: Results) -> list[Table]:

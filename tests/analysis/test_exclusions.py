@@ -148,7 +148,7 @@ def test_the_codebook_is_read_and_refused_by_field(
 def test_a_flip_of_sign_or_significance_is_said_loudly(
     tmp_path: Path, make_answers: Callable, make_study: Callable
 ) -> None:
-    rows = make_study({"PAAK": 100}, participants=12)
+    rows = make_study({"PAAK": 50}, participants=12)
     for (
         row
     ) in rows:  # one participant who always prefers PACE, and fails a rule nobody declared alone

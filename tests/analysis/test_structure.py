@@ -113,10 +113,13 @@ def test_thirds_follow_the_order_of_trials_and_drift_is_a_paired_t(study: Respon
         order = np.argsort(trials[people == person])
         assert third[people == person][order].tolist() == sorted(third[people == person])
     won = study.codes["chosen_method"] == study.codes["target"]
-    frame = pd.DataFrame({"p": people, "t": third, "w": won.astype(float)})
+    expected = (
+        pd.Series(won.astype(float)).groupby(study.codes["baseline"]).transform("mean").to_numpy()
+    )
+    frame = pd.DataFrame({"p": people, "t": third, "w": won - expected})
     means = frame.groupby(["p", "t"])["w"].mean().unstack()
     oracle = stats.ttest_rel(means[2], means[0])
-    found = order_drift(study, won)
+    found = order_drift(study, won, expected)
     assert found["change"] == pytest.approx((means[2] - means[0]).mean())
     assert found["p"] == pytest.approx(oracle.pvalue)
 
