@@ -19,8 +19,9 @@ from pyrender.constants import ProgramFlags
 from renderer import light
 from renderer.body_layer import BodyLayer
 from renderer.dirty import Rect, contact_reach, dirty_rect, shadow_rect
-from renderer.gl_renderer import CONTACT_SIZE, FLAGS
+from renderer.gl_renderer import FLAGS
 from renderer.static_room import ShadowSlot, StaticRoom, ViewState, copy_depth
+from renderer.surfaces import CONTACT_SIZE
 
 _SHADOW_REACH_TEXELS = 6.0
 """Texels by which the shading point may look up the shadow map beside itself: the lift along the
@@ -46,7 +47,7 @@ class FastPath:
     def place(self, vertices: np.ndarray) -> None:
         """Move the body; draws what all views share."""
         self._body.place(vertices)
-        self._room.renderer.contact.draw(self._body.primitive)
+        self._room.renderer.draw_contact(self._body.primitive)
         self._frame += 1
 
     def draw(self, state: ViewState) -> UInt8[np.ndarray, "h w 3"]:

@@ -7,13 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import UInt8
 
-from renderer.settings import Tiling
-
 SEAM_PX = 2
 SEAM_GREY = 255
 
 
-def tile(views: Sequence[UInt8[np.ndarray, "h w 3"]], tiling: Tiling) -> UInt8[np.ndarray, "_ _ 3"]:
+def tile(views: Sequence[UInt8[np.ndarray, "h w 3"]], tiling: str) -> UInt8[np.ndarray, "_ _ 3"]:
     """grid: 2x2 in reading order; strip: 1x4; single: the one view as it is.
 
     A thin light seam is drawn over the tiles' inner borders; it changes no size.

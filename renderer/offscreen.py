@@ -16,7 +16,6 @@ from contextlib import contextmanager
 from typing import Any, ClassVar
 
 from renderer.files import InputError
-from renderer.settings import Platform
 
 _ADVICE = {
     "osmesa": "libOSMesa (system package libosmesa6), or the render setting platform = 'egl'",
@@ -36,7 +35,7 @@ class _Held:
 
 
 @contextmanager
-def offscreen(platform: Platform = "osmesa") -> Iterator[str]:
+def offscreen(platform: str = "osmesa") -> Iterator[str]:
     """Make this process's context current; gives the name of the platform in use.
 
     The context outlives the block, so that the next clip finds its shaders compiled; `release`
@@ -78,7 +77,7 @@ def context_number() -> int:
     return _Held.number
 
 
-def choose_platform(platform: Platform) -> str:
+def choose_platform(platform: str) -> str:
     """Resolve `auto`: OSMesa where its library is found (Mesa 25.1 removed it), else EGL."""
     if platform != "auto":
         return platform
@@ -109,7 +108,8 @@ def _create(name: str) -> None:
         context = _new_context(name)
     except Exception as error:
         # PyOpenGL reports a missing library as ImportError, AttributeError or its own types.
-        raise _refusal(name, f"{type(error).__name__}: {error}") from None
+        found = f"{type(error).__name__}: {error}".replace("'", "")
+        raise _refusal(name, found) from None
     _Held.platform, _Held.context, _Held.pid = name, context, os.getpid()
     _Held.number += 1
 

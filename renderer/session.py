@@ -43,7 +43,6 @@ class Session:
             from renderer.fast_path import FastPath
 
             self._room = _kept_room(self._stage, self._views, self._settings)
-            stack.callback(self._room.renderer.contact.draw, None)
             faces = outward_faces(self._stage.vertices[0], self._stage.faces)
             self._body = BodyLayer(faces, self._stage.vertices[0], self._stage.body_colour)
             self._fast = FastPath(self._room, self._body)
@@ -97,6 +96,7 @@ class _Kept:
 
 def _kept_room(stage: Stage, views: tuple[CameraView, ...], settings: RenderSettings) -> StaticRoom:
     from renderer.static_room import StaticRoom
+    from renderer.surfaces import surfaces_of
 
     look = (settings.width, settings.height, settings.msaa, settings.shadow_size)
     key = (stage.room_size, stage.floor_z, views, look, context_number())
@@ -104,8 +104,9 @@ def _kept_room(stage: Stage, views: tuple[CameraView, ...], settings: RenderSett
     if not (same_parts and _Kept.key == key):
         forget_room()
         _Kept.room = StaticRoom(
-            stage.parts, stage.room_size, stage.floor_z, views, settings, context_number()
-        )
+            stage.parts, stage.room_size, stage.floor_z, views, settings,
+            surfaces_of(context_number()),
+        )  # fmt: skip
         _Kept.key = key
         before_release(forget_room)
     kept: StaticRoom = _Kept.room

@@ -29,14 +29,14 @@ class RenderSettings:
     width: int = 960
     """Pixels of one view (even)."""
     height: int = 540
-    tiling: Tiling = "grid"
+    tiling: str = "grid"
     """grid: 2x2 views; strip: 1x4 views side by side; single: the best view alone."""
     fps: float = 30.0
     msaa: int = 4
     """Samples a pixel: 4, or 0 for no anti-aliasing."""
     crf: int = 18
     """x264's constant rate factor; 18 is visually close to lossless."""
-    platform: Platform = "osmesa"
+    platform: str = "osmesa"
     """auto: OSMesa where its library is found, else EGL."""
     shadow_size: int = 2048
     """Texels along a side of the key light's shadow map."""

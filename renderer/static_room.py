@@ -23,6 +23,7 @@ from renderer.gl_renderer import FLAGS, RoomRenderer
 from renderer.leftovers import leftover_parts, shown_groups
 from renderer.settings import RenderSettings
 from renderer.stage import StagePart
+from renderer.surfaces import Surfaces
 from renderer.view_geometry import ViewGeometry
 from renderer.visible_set import visible_triangles
 
@@ -60,7 +61,7 @@ class StaticRoom:
         floor_z: float,
         views: Sequence[CameraView],
         settings: RenderSettings,
-        context_key: int,
+        surfaces: Surfaces,
     ) -> None:
         self.settings = settings
         self.given_parts = parts
@@ -73,7 +74,7 @@ class StaticRoom:
         self.sky = light.sky_box(room_size, floor_z)
         self.renderer = RoomRenderer(
             settings.width, settings.height, settings.msaa, settings.shadow_size, self.box,
-            self.sky, context_key,
+            self.sky, surfaces,
         )  # fmt: skip
         self.scene, self.light, self._camera_node = self._empty_scene()
         self.textures: dict[int, pyrender.Texture] = {}
@@ -93,7 +94,7 @@ class StaticRoom:
         copy_depth(slot.working, slot.static, self.settings.shadow_size)
         visible = visible_triangles(
             self.batches, self.primitives, shown, projection, self.settings.msaa,
-            self.renderer._program_cache,
+            self.renderer.surfaces,
         )  # fmt: skip
         geometry = ViewGeometry(self.batches, visible, projection)
         self.views.append(ViewState(view, projection, background, slot, geometry))
@@ -106,7 +107,7 @@ class StaticRoom:
         for batch, node in zip(self.batches, self._nodes, strict=True):
             node.mesh.is_visible = batch.group in slot.shown
         self._set_body(body)
-        self.renderer.contact.draw(None if body is None else body.primitive)
+        self.renderer.draw_contact(None if body is None else body.primitive)
         self.renderer.shared_uniforms["occlusion_pick"] = self.occlusion_pick(view)
         self.light._shadow_texture = slot.working
         # pyrender loads what is new to it and frees what its scene (or its setter) drops; these
@@ -136,9 +137,10 @@ class StaticRoom:
         self.light._shadow_texture = None
         for state in self.views:
             state.geometry.delete()
+        size, surfaces = self.settings.shadow_size, self.renderer.surfaces
         for slot in self._slots.values():
-            slot.static._remove_from_context()
-            slot.working._remove_from_context()
+            surfaces.give_back(size, slot.static)
+            surfaces.give_back(size, slot.working)
         self.renderer._shadow_textures = set()
         self.renderer.delete()
         self._slots, self.views = {}, []
@@ -174,30 +176,11 @@ class StaticRoom:
                 self.renderer._meshes = self.renderer._meshes | {mesh}
 
     def _new_slot(self, shown: frozenset[str]) -> ShadowSlot:
-        textures = [shadow_texture(self.settings.shadow_size) for _ in range(2)]
+        size = self.settings.shadow_size
+        textures = [self.renderer.surfaces.take_shadow_map(size) for _ in range(2)]
         slot = ShadowSlot(shown, textures[0], textures[1])
         self._slots[shown] = slot
         return slot
-
-
-def shadow_texture(size: int) -> pyrender.Texture:
-    """A depth texture that the shader samples by comparison."""
-    texture = pyrender.Texture(
-        width=size, height=size, source_channels="D", data_format=GL.GL_FLOAT
-    )
-    texture._add_to_context()
-    texture._bind()
-    for name, value in (
-        (GL.GL_TEXTURE_COMPARE_MODE, GL.GL_COMPARE_REF_TO_TEXTURE),
-        (GL.GL_TEXTURE_COMPARE_FUNC, GL.GL_LEQUAL),
-        (GL.GL_TEXTURE_MAG_FILTER, GL.GL_LINEAR),
-        (GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR),
-        (GL.GL_TEXTURE_WRAP_S, GL.GL_CLAMP_TO_EDGE),
-        (GL.GL_TEXTURE_WRAP_T, GL.GL_CLAMP_TO_EDGE),
-    ):
-        GL.glTexParameteri(GL.GL_TEXTURE_2D, name, value)
-    texture._unbind()
-    return texture
 
 
 def copy_depth(

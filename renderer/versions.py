@@ -6,13 +6,12 @@ import importlib.metadata
 import re
 
 from renderer.offscreen import offscreen
-from renderer.settings import Platform
 from renderer.video import ffmpeg_version
 
 _PACKAGES = ("pyrender-maintained", "PyOpenGL", "imageio-ffmpeg", "numpy", "trimesh", "embreex")
 
 
-def render_versions(platform: Platform = "osmesa") -> dict[str, str]:
+def render_versions(platform: str = "osmesa") -> dict[str, str]:
     """Platform, GL renderer, Mesa, LLVM, ffmpeg and the Python packages that decide the pixels.
 
     Raises `InputError` when the platform's library or ffmpeg is missing.

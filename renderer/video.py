@@ -72,10 +72,11 @@ def write_video(
                 count += 1
             process.stdin.close()
         except BrokenPipeError:
-            pass  # ffmpeg ended first; its exit status below says why
+            # ffmpeg ended first; its exit status below says why.
+            process.communicate()
         except BaseException:
             process.kill()
-            process.wait()
+            process.communicate()
             raise
         _require_success(process, log, target)
         if count == 0:
@@ -172,7 +173,7 @@ def _require_success(process: subprocess.Popen[bytes], log: IO[bytes], target: P
     if status == 0:
         return
     log.seek(0)
-    said = _last_line(log.read().decode(errors="replace"))
+    said = _first_line(log.read().decode(errors="replace"))
     found = f"killed by signal {-status}" if status < 0 else f"exit {status}: {said}"
     raise InputError(target, "ffmpeg", found, "an encode that ends well")
 
@@ -181,6 +182,12 @@ def _missing(found: str) -> InputError:
     return InputError(
         "renderer", "ffmpeg", found, "the program ffmpeg (Python package imageio-ffmpeg)"
     )
+
+
+def _first_line(text: str) -> str:
+    """The cause: what ffmpeg says afterwards are its consequences."""
+    lines = [re.sub(r"^\[[^]]*\] ", "", line.strip()) for line in text.splitlines() if line.strip()]
+    return lines[0] if lines else "no message"
 
 
 def _last_line(text: str) -> str:

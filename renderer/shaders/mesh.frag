@@ -47,7 +47,7 @@ const float PI = 3.141592653589793;
 const float CONTACT_HEIGHT = 0.30;   // metres; keep equal to dirty.CONTACT_HEIGHT_M
 const float CONTACT_DEPTH = 0.10;    // metres; keep equal to dirty.CONTACT_DEPTH_M
 const float CONTACT_STEP = 0.028;    // metres; keep equal to dirty.CONTACT_STEP_M
-const float CONTACT_STRENGTH = 0.62;
+const float CONTACT_STRENGTH = 0.70;
 
 vec3 decoded(vec3 srgb)
 {
