@@ -67,11 +67,17 @@ def seats_ahead(participant: Participant) -> list[Trial]:
     return [trial for trial in participant.trials if trial.state not in ("answered", "void")]
 
 
-def renew_leases(participant: Participant, now: datetime, lease: timedelta) -> None:
+def renew_leases(
+    session: Session, participant: Participant, now: datetime, lease: timedelta
+) -> None:
     """Any sign of life keeps all living leases of a person alive."""
-    for trial in participant.trials:
-        if _is_leased(trial, now):
-            trial.lease_expires_at = now + lease
+    session.execute(
+        update(Trial)
+        .where(Trial.participant_id == participant.id, Trial.state.in_(OPEN_STATES))
+        .where(Trial.lease_expires_at > now)
+        .values(lease_expires_at=now + lease),
+        execution_options={"synchronize_session": False},
+    )
 
 
 def sweep(session: Session, version_id: int, now: datetime, cell_id: int | None = None) -> int:

@@ -199,7 +199,7 @@ def show_trial(
     trial.shown_at = trial.shown_at or now
     if trial.state == "leased":
         trial.state = "shown"
-    _alive(participant, now, lease)
+    _alive(session, participant, now, lease)
     return trial
 
 
@@ -213,8 +213,8 @@ def record_events(
 ) -> int:
     """Store reports of the page, each once; return how many were new. Any report renews the leases."""
     participant = lock_participant(session, participant_id)
-    trial = _own_trial(participant, trial_token)
-    _alive(participant, now, lease)
+    trial = _own_trial(session, participant, trial_token)
+    _alive(session, participant, now, lease)
     known = set(session.scalars(select(ViewingEvent.uuid).where(ViewingEvent.trial_id == trial.id)))
     fresh = {event["uuid"]: event for event in events if event["uuid"] not in known}
     for event in fresh.values():
@@ -245,7 +245,7 @@ def record_answer(
     back. A lease that expired meanwhile makes the answer late, not void.
     """
     participant = lock_participant(session, participant_id)
-    trial = _own_trial(participant, trial_token)
+    trial = _own_trial(session, participant, trial_token)
     if trial.response is not None:
         return trial.response
     _require_running(participant.version, participant.mode)
@@ -271,7 +271,7 @@ def record_answer(
     if feedback is not None:
         note = {f"practice-{trial.ordinal}": {"feedback": feedback}}
         participant.steps = {**participant.steps, **note}
-    _alive(participant, now, lease)
+    _alive(session, participant, now, lease)
     session.flush()
     return trial.response
 
@@ -303,24 +303,26 @@ def skip_trial(
 ) -> None:
     """Give up a trial whose clip would not play; its pair goes to somebody else."""
     participant = lock_participant(session, participant_id)
-    trial = _own_trial(participant, trial_token)
+    trial = _own_trial(session, participant, trial_token)
     if trial.state == "answered":
         return
     count(session, trial, participant.mode, counted=False)
     trial.state, trial.lease_expires_at = "void", None
-    _alive(participant, now, lease)
+    _alive(session, participant, now, lease)
 
 
-def _own_trial(participant: Participant, trial_token: str) -> Trial:
-    for trial in participant.trials:
-        if trial.token is not None and trial.token == trial_token:
-            return trial
-    raise Refused("bad_request")
+def _own_trial(session: Session, participant: Participant, trial_token: str) -> Trial:
+    trial = session.scalar(
+        select(Trial).where(Trial.participant_id == participant.id, Trial.token == trial_token)
+    )
+    if trial is None:
+        raise Refused("bad_request")
+    return trial
 
 
-def _alive(participant: Participant, now: datetime, lease: timedelta) -> None:
+def _alive(session: Session, participant: Participant, now: datetime, lease: timedelta) -> None:
     participant.seen_at = now
-    renew_leases(participant, now, lease)
+    renew_leases(session, participant, now, lease)
 
 
 def _require_running(version: StudyVersion, mode: str) -> None:

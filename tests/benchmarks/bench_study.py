@@ -36,6 +36,8 @@ from study_app.studies import find_study
 ROOT = Path(__file__).resolve().parents[2]
 SECONDS = float(os.environ.get("PACE_BENCH_SECONDS", "90"))
 TRIAL_S = 20.0
+RAMP_S = 40.0
+"""People arrive over this time, before anything is measured."""
 STUDY = """
 study_id = "load"
 title = "Load"
@@ -68,6 +70,7 @@ class Person(threading.Thread):
     def __init__(self, url: str, number: int, until: float) -> None:
         super().__init__(daemon=True)
         self.url, self.until, self.rng = url, until, random.Random(number)
+        self.since = until - SECONDS
         self.browser = requests.Session()
         self.browser.trust_env = False
         self.times: dict[str, list[float]] = {"page": [], "event": [], "answer": [], "bind": []}
@@ -77,7 +80,7 @@ class Person(threading.Thread):
     def run(self) -> None:
         """Enter, then answer until the time is over."""
         try:
-            time.sleep(self.rng.uniform(0, min(TRIAL_S, SECONDS / 2)))
+            time.sleep(self.rng.uniform(0, RAMP_S))
             page = self.enter()
             while time.time() < self.until and page.main.get("data-page") == "trial":
                 page = self.trial(page)
@@ -109,9 +112,9 @@ class Person(threading.Thread):
         self.acknowledged.append(self.call("answer", page, "answer", body)["answer_id"])
         began = time.perf_counter()
         reply = self.browser.get(f"{self.url}/s/load/session", timeout=30)
-        self.times["page"].append(1000 * (time.perf_counter() - began))
+        self.note("page", began)
         timing = reply.headers.get("Server-Timing", "")
-        if timing:
+        if timing and time.time() > self.since:
             self.times["bind"].append(float(timing.rpartition("=")[2]))
         return self.read(reply)
 
@@ -119,9 +122,14 @@ class Person(threading.Thread):
         url = self.url + page.main["data-answer-url"].removesuffix("answer") + what
         began = time.perf_counter()
         reply = self.browser.post(url, json=body, headers={"X-CSRFToken": page.csrf}, timeout=30)
-        self.times[name].append(1000 * (time.perf_counter() - began))
+        self.note(name, began)
         reply.raise_for_status()
         return reply.json()
+
+    def note(self, name: str, began: float) -> None:
+        """Keep a duration, once everybody has arrived."""
+        if time.time() > self.since:
+            self.times[name].append(1000 * (time.perf_counter() - began))
 
 
 def measure(
@@ -147,7 +155,7 @@ def measure(
     assert server.stdout is not None
     try:
         url = json.loads(server.stdout.readline())["url"]
-        until = time.time() + SECONDS + 10
+        until = time.time() + RAMP_S + 5 + SECONDS
         crowd = [Person(url, number, until) for number in range(people)]
         for person in crowd:
             person.start()
