@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from analysis.results import Results, ordered
+from analysis.rules import RULES, Rule
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
@@ -62,17 +63,25 @@ def preference_note(results: Results) -> str:
 def flow_table(results: Results) -> Table:
     """From the rows of the file to the answers analysed; the counts add up."""
     flow = results["flow"]
-    rows = [("rows in the file", f"{flow['rows']:,}", "")]
-    rows += [(f"not analysed: mode {m}", f"−{c:,}", "") for m, c in flow["other_mode"].items()]
-    rows += [(f"not analysed: {k} trials", f"−{c:,}", "") for k, c in flow["other_kind"].items()]
-    people = flow["excluded_participants"]
-    rows += [
-        (f"excluded: {rule}", _less(count), _less(people[rule]) if rule in people else "")
-        for rule, count in flow["excluded_answers"].items()
-    ]
-    rows.append(("analysed", f"{flow['analysed']:,}", f"{flow['analysed_participants']}"))
-    header = ("step", "answers", "participants")
+    rows = [("rows in the file", f"{flow['rows']:,}", f"{flow['participants']}", "")]
+    rows += [(f"not analysed: mode {m}", _less(c), "", "") for m, c in flow["other_mode"].items()]
+    rows += [(f"not analysed: {k} trials", _less(c), "", "") for k, c in flow["other_kind"].items()]
+    rows += [_excluded(rule, results) for rule in RULES if rule.name in flow["excluded_answers"]]
+    rows.append(("analysed", f"{flow['analysed']:,}", f"{flow['analysed_participants']}", ""))
+    header = ("step", "answers", "participants", "rule alone would remove")
     return Table("flow", "From the file to the analysis", header, tuple(rows))
+
+
+def _excluded(rule: Rule, results: Results) -> tuple[str, str, str, str]:
+    """What a rule removed after those before it, and what it would remove by itself."""
+    flow, name = results["flow"], rule.name
+    prose = rule.prose[0].lower() + rule.prose[1:].rstrip(".")
+    people = flow["excluded_participants"]
+    return (
+        f"excluded: {prose} ({name} = {results['rules'][name]:g})",
+        _less(flow["excluded_answers"][name]), _less(people[name]) if name in people else "",
+        f"{flow['hits'][name]:,} {rule.removes}{'' if flow['hits'][name] == 1 else 's'}",
+    )  # fmt: skip
 
 
 def _less(count: int) -> str:
