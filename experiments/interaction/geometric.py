@@ -29,6 +29,8 @@ SUPPORT_THICKNESS_M = 0.03
 """Seat and back vertices this close above the lowest of their region touch."""
 PALM_THICKNESS_M = 0.015
 """Palm vertices this close behind the foremost of their palm touch."""
+TOP_HEIGHT_M = 1.15
+"""Nobody leans on a top higher than this."""
 HOLD_S = 0.25
 """Sitting, lying and touching shorter than this are passing postures."""
 CERTAIN = 10.0
@@ -40,7 +42,7 @@ _SEATS = {"chair": 0.45, "sofa": 0.43, "bed": 0.52, "seating": 0.46, "stool": 0.
 """Classes that people sit on, with the seat height that is usual for them, metres."""
 _HIGH_SEATS = {"stool": 0.74, "counter": 0.9, "table": 0.75}
 _BEDS = ("bed", "sofa", "seating")
-_TOPS = ("table", "counter", "chest_of_drawers")
+_TOPS = ("table", "counter")
 _FRONTS = ("shelving", "cabinet", "wall", "door", "appliances", "board_panel")
 
 Support = tuple[Bool[np.ndarray, "T V"], tuple[str, ...]]
@@ -82,7 +84,9 @@ def body_supports(moving: MovingBody) -> list[Support]:
     supports.append(
         (underside(moving, seated, ("buttocks", "thigh_backs")), seats_for(seat_height))
     )
-    hands = [_palm_supports(moving, palm_touch(moving, side, floor)) for side in ("left", "right")]
+    hands = [
+        _palm_supports(moving, palm_touch(moving, side, floor), floor) for side in ("left", "right")
+    ]
     upright = ~(lying | seated)[:, None]
     # Both hands lean on the same thing, so one class is chosen for the two of them.
     supports += [
@@ -177,12 +181,15 @@ def seats_for(height: float) -> tuple[str, ...]:
 _LYING = ("back", "buttocks|thigh_backs", "calves")
 
 
-def _palm_supports(moving: MovingBody, touch: Bool[np.ndarray, "T V"]) -> list[Support]:
-    """A palm facing down leans on a top, a palm facing ahead touches a front."""
-    count = np.maximum(touch.sum(1), 1)[:, None]
-    facing = (moving.normals * touch[..., None]).sum(1) / count
-    down = facing[:, 2] < -0.6
-    return [(touch & down[:, None], _TOPS), (touch & ~down[:, None], _FRONTS)]
+def _palm_supports(
+    moving: MovingBody, touch: Bool[np.ndarray, "T V"], floor: float
+) -> list[Support]:
+    """A palm facing down at table height leans on a top, any other touches a front or a shelf."""
+    count = np.maximum(touch.sum(1), 1)
+    facing = (moving.normals[..., 2] * touch).sum(1) / count
+    height = (moving.vertices[..., 2] * touch).sum(1) / count - floor
+    leans = (facing < -0.6) & (height < TOP_HEIGHT_M)
+    return [(touch & leans[:, None], _TOPS), (touch & ~leans[:, None], _FRONTS)]
 
 
 def _kept(support: Support, scene_classes: Sequence[str]) -> Support:

@@ -12,11 +12,12 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from experiments.placement.bones import bone_points
 from experiments.placement.candidates import Starts, class_match
 from experiments.placement.errors import NoAdmissibleStart, OptimisationFailed
 from experiments.placement.placement import Placement
 from experiments.placement.problem import Problem
-from experiments.placement.rigid import move_motion
+from experiments.placement.rigid import move, move_motion
 from experiments.placement.solver import Fit, altered_bodies
 
 
@@ -48,6 +49,10 @@ def fault(problem: Problem, fit: Fit) -> str:
         if gap > settings.max_gap:
             expected = ", ".join(problem.expected_classes())
             return f"stays {100 * gap:.0f} cm away from what it expects to touch ({expected})"
+    if settings.bone_clearance is not None:
+        clearance = least_clearance(problem, fit)
+        if clearance < settings.bone_clearance / 2:
+            return "has a bone inside something"
     if settings.start_filter is not None:
         rigid = Starts(np.array([fit.yaw]), fit.translation[None], np.zeros(1))
         match = float(class_match(problem, rigid)[0])
@@ -66,6 +71,16 @@ def contact_gap(problem: Problem, fit: Fit) -> float:
     """Mean distance of the contacts beyond the floor from the scene, metres; 0 without any."""
     beyond = problem.beyond_floor()
     return float(_distance(problem, fit)[beyond].abs().mean()) if beyond.any() else 0.0
+
+
+def least_clearance(problem: Problem, fit: Fit) -> float:
+    """Least distance of a bone from any surface, metres; negative inside."""
+    with torch.no_grad():
+        pose, transl = problem.pose + fit.delta, problem.transl + fit.shift
+        bones = bone_points(problem.body.joint_transforms(pose, transl)[1])
+        yaw, translation = torch.tensor(fit.yaw), torch.as_tensor(fit.translation)
+        placed = move(bones, yaw.to(bones), translation.to(bones), problem.centre)
+        return float(problem.field.clearance(placed).min())
 
 
 def _distance(problem: Problem, fit: Fit) -> Float[Tensor, "T V"]:

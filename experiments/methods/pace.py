@@ -7,7 +7,7 @@ from functools import partial
 from typing import Literal
 
 from experiments.body.model import BodyModel
-from experiments.methods.outcome import to_placement
+from experiments.methods.outcome import fault, to_placement
 from experiments.motion.motion import Motion
 from experiments.placement.candidates import find_starts
 from experiments.placement.features import choose_features
@@ -87,10 +87,15 @@ def rigid_fits(problem: Problem) -> list[Fit]:
 
 
 def alter_best(problem: Problem, rigid: list[Fit]) -> list[tuple[Fit, Fit]]:
-    """Alter the best `n_altered` rigid fits, each from its own optimum; pairs of (rigid, altered)."""
+    """Alter the best `n_altered` rigid fits, each from its own optimum; pairs of (rigid, altered).
+
+    A fit with a fault does not count, so that a worse start may still give a sound answer.
+    """
     settings = problem.settings
     pairs: list[tuple[Fit, Fit]] = []
-    for fit in rigid[: settings.n_altered]:
+    for fit in rigid:
+        if sum(not fault(problem, found) for _, found in pairs) == settings.n_altered:
+            break
         limit = None
         if pairs and settings.give_up_factor is not None:
             limit = settings.give_up_factor * min(found.energy for _, found in pairs)

@@ -19,6 +19,7 @@ from torch import Tensor
 from experiments.placement.errors import MotionTooLong, NoAdmissibleStart
 from experiments.placement.objectives import total
 from experiments.placement.problem import Problem, RigidProblem
+from experiments.placement.rigid import move
 
 _LEAST_KEPT = 60
 _BATCH_POINTS = 500_000
@@ -106,6 +107,14 @@ def _filtered(problem: Problem, starts: Starts) -> Starts:
             reason = f"no start brings the body to what it expects to touch ({names})"
             raise NoAdmissibleStart(problem.motion.motion_id, problem.scene.scene_id, reason)
         starts = starts.take(matching)
+    if problem.settings.bone_clearance is not None:
+        clear = bone_clearance(problem, starts) >= problem.settings.bone_clearance
+        if not clear.any():
+            reason = (
+                "every start that reaches what it expects to touch puts a bone through something"
+            )
+            raise NoAdmissibleStart(problem.motion.motion_id, problem.scene.scene_id, reason)
+        starts = starts.take(clear)
     return starts.scored(coarse_scores(problem, starts))
 
 
@@ -172,6 +181,20 @@ def class_match(problem: RigidProblem, starts: Starts) -> Float[np.ndarray, " N"
         found = _batched(thin, starts, partial(_share_right, thin, asked))
         match = np.minimum(match, found)
     return match
+
+
+def bone_clearance(problem: Problem, starts: Starts) -> Float[np.ndarray, " N"]:
+    """Least distance of any bone from any surface, over twice `coarse_frames` frames, metres."""
+    bones = problem.bones[_spread(len(problem.bones), 2 * problem.settings.coarse_frames)]
+    batch = max(1, _BATCH_POINTS // bones[..., 0].numel())
+    least = np.zeros(len(starts))
+    for begin in range(0, len(starts), batch):
+        part = slice(begin, begin + batch)
+        yaw = torch.as_tensor(starts.yaw[part], dtype=bones.dtype)
+        translation = torch.as_tensor(starts.translation[part], dtype=bones.dtype)
+        placed = move(bones, yaw, translation, problem.centre)
+        least[part] = problem.field.clearance(placed).amin(-1).double().numpy()
+    return least
 
 
 def _share_right(

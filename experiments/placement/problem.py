@@ -13,6 +13,7 @@ from torch import Tensor
 from experiments.body.model import BodyModel
 from experiments.interaction.features import InteractionFeatures
 from experiments.motion.motion import Motion
+from experiments.placement.bones import bone_points
 from experiments.placement.objectives import placement_terms
 from experiments.placement.rigid import clip_centre, clip_floor, move
 from experiments.placement.scene_field import SceneField
@@ -86,6 +87,8 @@ class Problem(RigidProblem):
     pose: Float[Tensor, "T 22 3"]
     transl: Float[Tensor, "T 3"]
     pelvis: Float[np.ndarray, "T 3"]
+    bones: Float[Tensor, "T M 3"]
+    """Points inside the unaltered body; see `bone_points`."""
     step_scale: Float[Tensor, " T"]
     """What frame-to-frame differences are multiplied by; see `time_step_scale`."""
     floor: float
@@ -141,6 +144,7 @@ def build_problem(
         transl=transl,
         vertices=mesh.vertices.contiguous(),
         pelvis=pelvis,
+        bones=bone_points(mesh.joints),
         contact=contact,
         wanted=torch.where(contact, classes, 0),
         k=torch.as_tensor(weights.values, dtype=dtype),

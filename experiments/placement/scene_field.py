@@ -34,6 +34,10 @@ class SceneField:
         column = torch.cumsum(ever, 0).sub(1).clamp(min=0)
         return torch.where(contact, plain[..., column], distance)
 
+    def clearance(self, points: Float[Tensor, "*B T M 3"]) -> Float[Tensor, "*B T"]:
+        """Least distance to the true surface over some points of a frame, metres."""
+        return self._plain.distance(points).amin(-1)
+
     def label(
         self, points: Float[Tensor, "*B T V 3"], contact: Bool[Tensor, "T V"]
     ) -> Int64[Tensor, "*B T V"]:

@@ -49,6 +49,9 @@ class PlacementSettings:
     max_gap: float | None = 0.12
     """Reject a fit whose contacts with anything but floor are further than this from the scene on
     average, metres (ours): hands that lean on air. None keeps all."""
+    bone_clearance: float | None = 0.015
+    """Reject starts and fits that bring a bone nearer to a surface than this, metres (ours): limbs
+    through boards too thin to cost much penetration. None keeps all."""
     coarse_frames: int = 20
     """Frames of the first, coarse scoring of all starts."""
     coarse_vertices: int = 90
@@ -120,6 +123,7 @@ PRESETS: dict[str, PlacementSettings] = {
         start_filter=None,
         max_depth=None,
         max_gap=None,
+        bone_clearance=None,
         n_starts=10,
         n_altered=10,
         huber_widths=(0.0,),

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from experiments.interaction.geometric import geometric_features, seats_for
 from experiments.interaction.mesh import feature_vertices, moving_body
@@ -75,14 +76,17 @@ def features_in(features, region) -> int:
     return int(np.isin(touching, region).sum())
 
 
-def test_an_outstretched_still_hand_touches_a_table_top_or_a_front(sit, slim) -> None:
+@pytest.mark.parametrize(("down_deg", "touched"), [(0.0, "shelving"), (45.0, "table")])
+def test_a_still_hand_ahead_touches_a_shelf_at_shoulder_height_and_a_table_below(
+    sit, slim, down_deg: float, touched: str
+) -> None:
     motion = sit(40, stand=1.0)
     pose = motion.pose.copy()
-    # Arm straight ahead with the palm down: shoulder yaw of 90 degrees from the T-pose.
-    pose[:, 17] = [0.0, np.pi / 2, 0.0]
+    # From the T-pose: arm turned ahead with the palm down, then lowered.
+    lowered = Rotation.from_euler("x", down_deg, degrees=True)
+    pose[:, 17] = (lowered * Rotation.from_euler("y", 90, degrees=True)).as_rotvec()
     reaching = dataclasses.replace(motion, pose=pose)
-    classes = classes_of(geometric_features(reaching, slim, EVERYTHING)[0])
-    assert classes == {"floor", "table"}
+    assert classes_of(geometric_features(reaching, slim, EVERYTHING)[0]) == {"floor", touched}
     assert classes_of(geometric_features(motion, slim, EVERYTHING)[0]) == {"floor"}
 
 
