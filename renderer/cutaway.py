@@ -25,13 +25,6 @@ TOUCH_M = 0.05
 BLOCKS_SHARE = 0.02
 """Medium furniture goes when it covers this share of the body's weight in the mean."""
 
-WALL_NORMALS = {
-    "n": np.array([0.0, 1.0]),
-    "s": np.array([0.0, -1.0]),
-    "e": np.array([1.0, 0.0]),
-    "w": np.array([-1.0, 0.0]),
-}
-
 
 @dataclass(frozen=True)
 class Group:

@@ -25,7 +25,8 @@ class RoomRenderer(pyrender.Renderer):  # type: ignore[misc]
 
     Against pyrender's own renderer: the light's box depends on the room alone; meshes are drawn in
     the order in which they were added (pyrender iterates over a set, whose order changes from
-    process to process); the number of samples is a setting; contact darkening is bound.
+    process to process); the number of samples is a setting; contact darkening is bound; meshes
+    named in `shadowless` cast no shadow.
     """
 
     def __init__(
@@ -40,6 +41,8 @@ class RoomRenderer(pyrender.Renderer):  # type: ignore[misc]
     ) -> None:
         super().__init__(width, height)
         self.surfaces = surfaces
+        self.shadowless: frozenset[str] = frozenset()
+        self._casting = False
         self._program_cache = surfaces.programs
         self.samples, self.shadow_size = samples, shadow_size
         self.light_matrices = (box.view, box.projection)
@@ -80,7 +83,15 @@ class RoomRenderer(pyrender.Renderer):  # type: ignore[misc]
         return self.light_matrices
 
     def _sorted_mesh_nodes(self, scene: Any) -> list[Any]:
-        return sorted(scene.mesh_nodes, key=lambda node: node.name)
+        nodes = [n for n in scene.mesh_nodes if not (self._casting and n.name in self.shadowless)]
+        return sorted(nodes, key=lambda node: node.name)
+
+    def _shadow_mapping_pass(self, scene: Any, light_node: Any, flags: int) -> None:
+        self._casting = True
+        try:
+            super()._shadow_mapping_pass(scene, light_node, flags)
+        finally:
+            self._casting = False
 
     def _bind_lighting(self, scene: Any, program: Any, node: Any, flags: int) -> None:
         super()._bind_lighting(scene, program, node, flags)

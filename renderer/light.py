@@ -52,6 +52,17 @@ def light_direction(azimuth_deg: float, elevation_deg: float) -> Float[np.ndarra
     return -np.array(towards)
 
 
+def walls_towards_key() -> set[str]:
+    """Groups of the walls between the key light and the room: they and what hangs there cast none.
+
+    The bare wall is open to the light (its back is culled), and the frames of its doors and windows
+    alone would draw meaningless lines over the floor.
+    """
+    towards = -light_direction(KEY_AZIMUTH_DEG, KEY_ELEVATION_DEG)
+    outward = {"n": towards[1], "s": -towards[1], "e": towards[0], "w": -towards[0]}
+    return {f"wall:{wall}" for wall, share in outward.items() if share > 0}
+
+
 def light_pose() -> Float[np.ndarray, "4 4"]:
     """Camera-to-world pose of the key light, looking along -z (origin arbitrary)."""
     back = -light_direction(KEY_AZIMUTH_DEG, KEY_ELEVATION_DEG)

@@ -79,6 +79,12 @@ class StaticRoom:
         self.scene, self.light, self._camera_node = self._empty_scene()
         self.textures: dict[int, pyrender.Texture] = {}
         self.primitives, self._nodes = self._add_batches()
+        lit_through = light.walls_towards_key()
+        self.renderer.shadowless = frozenset(
+            node.name
+            for batch, node in zip(self.batches, self._nodes, strict=True)
+            if batch.group in lit_through
+        )
         self._body_node: pyrender.Node | None = None
         self.views: list[ViewState] = []
         self._slots: dict[frozenset[str], ShadowSlot] = {}
