@@ -16,12 +16,15 @@ if TYPE_CHECKING:
 
 INK, SECOND, GREY, PALE = "#1f4e79", "#c05a00", "#6b6b6b", "#c9c9c9"
 FORMATS = ("svg", "pdf", "png")
+MOST_STIMULI = 150
+"""A comparison with more stimuli is left out of the plot of single stimuli (they stand in the csv)."""
 Drawing = Callable[[Results], "Figure"]
 CAPTIONS = {
     "forest": "Share of answers in favour of the target, per comparison.",
     "shares": "Both shares of every comparison, around an even split.",
     "scenes": "Rate per scene with clustered intervals; the thin line is the comparison's overall rate.",
     "participants": "One dot per participant; the triangle is the overall rate.",
+    "stimuli": "Rate of every stimulus, raw (hollow) and drawn towards the mean by the mixed model (filled).",
     "scale": "Bradley-Terry scale of all methods with clustered intervals; hollow: the target.",
 }
 _STYLE: Any = {
@@ -45,6 +48,8 @@ def all_figures(results: Results) -> dict[str, Drawing]:
         found["scenes"] = scene_panels
     if any(row["participant_counts"] for row in rows):
         found["participants"] = participant_dots
+    if any(len(row["stimuli_rates"]) <= MOST_STIMULI for row in rows):
+        found["stimuli"] = stimulus_dots
     if results["scale"]["methods"]:
         found["scale"] = scale
     return found
@@ -155,6 +160,31 @@ def participant_dots(results: Results) -> Figure:
     labels = [_label(name, f"{row['participants']} participants") for name, row in rows]
     axes.set_yticks(range(len(rows)), labels)
     axes.set_ylim(len(rows) - 0.42, -0.5)
+    return figure
+
+
+def stimulus_dots(results: Results) -> Figure:
+    """Every stimulus: raw rate hollow, drawn towards the mean by the mixed model filled, joined by a line."""
+    rows = [
+        (name, row) for name, row in ordered(results) if len(row["stimuli_rates"]) <= MOST_STIMULI
+    ]
+    figure, axes = _canvas(7.2, 0.7 + 0.7 * len(rows))
+    for place, (_, row) in enumerate(rows):
+        for one in row["stimuli_rates"]:
+            raw, pooled = 100 * one["rate"], one["pooled"]
+            if pooled is not None:
+                axes.plot(
+                    [raw, 100 * pooled], [place + 0.2, place - 0.15], color=PALE, lw=0.7, zorder=1
+                )
+                axes.plot(100 * pooled, place - 0.15, "o", color=INK, ms=4, mew=0, zorder=3)
+            axes.plot(raw, place + 0.2, "o", mfc="white", mec=GREY, ms=4, zorder=2, clip_on=False)
+    axes.axvline(50, color=GREY, lw=1, ls=":", zorder=0)
+    _share_axis(
+        axes, f"answers about one stimulus in favour of {', '.join(results['targets'])} (%)"
+    )
+    labels = [_label(name, f"{len(row['stimuli_rates'])} stimuli") for name, row in rows]
+    axes.set_yticks(range(len(rows)), labels)
+    axes.set_ylim(len(rows) - 0.55, -0.5)
     return figure
 
 

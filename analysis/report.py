@@ -14,7 +14,7 @@ _SECTIONS = (
     ("Result", ("preference",), ("forest", "shares")),
     ("Methods", (), ()),
     ("How sure is it?", ("intervals", "effects", "differences"), ("participants",)),
-    ("Scenes", ("scenes",), ("scenes",)),
+    ("Scenes and stimuli", ("scenes",), ("scenes", "stimuli")),
     ("From the file to the analysis", ("flow", "quality"), ()),
     ("Does it hang on something?", ("sensitivity",), ()),
     ("Agreement and scale", ("reliability", "scale"), ("scale",)),

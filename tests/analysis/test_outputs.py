@@ -225,7 +225,7 @@ def test_the_report_is_one_well_formed_page_without_remote_assets(simulated: Pat
     ids = re.findall(r'\bid="([^"]+)"', text)
     assert len(ids) == len(set(ids))
     assert {address[1:] for address in page.addresses} <= set(ids)
-    assert text.count('role="img"') == 5 and "@import" not in text and "url(http" not in text
+    assert text.count('role="img"') == 6 and "@import" not in text and "url(http" not in text
 
 
 def test_tables_and_panels_share_one_order(final: Path) -> None:
