@@ -9,7 +9,8 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.claims import check_claims, check_text, implied_counts, read_claim_names
+from analysis.claims import check_claims, check_text, implied_counts
+from analysis.claims_found import read_claim_names
 from analysis.claims_text import sentences
 from analysis.cli import check_claims as command
 from analysis.display import percent
