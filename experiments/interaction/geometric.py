@@ -25,6 +25,8 @@ SOLE_REACH_M = 0.04
 """A foot whose lowest vertex is higher than this above the clip's floor is in the air."""
 SOLE_SPEED = 0.45
 """A foot faster than this, m/s, is swinging."""
+HANGING_M = 0.07
+"""A region whose lowest vertex is higher than this above the lowest of all hangs in the air."""
 SUPPORT_THICKNESS_M = 0.03
 """Seat and back vertices this close above the lowest of their region touch."""
 PALM_THICKNESS_M = 0.015
@@ -80,10 +82,13 @@ def body_supports(moving: MovingBody) -> list[Support]:
     bed_height = _median_height(moving, lying, _columns(moving, "back", "buttocks")) - floor
     supports: list[Support] = [(soles_down(moving, floor), ("floor",))]
     on_bed = _BEDS if bed_height > 0.2 else ("floor",)
-    supports.append((underside(moving, lying, _LYING), on_bed))
-    supports.append(
-        (underside(moving, seated, ("buttocks", "thigh_backs")), seats_for(seat_height))
-    )
+    flat = underside(moving, lying, _LYING)
+    sitting = underside(moving, seated, ("buttocks", "thigh_backs"))
+    if flat.any() and on_bed == _BEDS:
+        # Who sits down to lie down sits on the bed.
+        supports.append((flat | sitting, _BEDS))
+    else:
+        supports += [(flat, on_bed), (sitting, seats_for(seat_height))]
     hands = [
         _palm_supports(moving, palm_touch(moving, side, floor), floor) for side in ("left", "right")
     ]
@@ -112,14 +117,21 @@ def soles_down(moving: MovingBody, floor: float) -> Bool[np.ndarray, "T V"]:
 def underside(
     moving: MovingBody, frames: Bool[np.ndarray, " T"], regions: tuple[str, ...]
 ) -> Bool[np.ndarray, "T V"]:
-    """Downward-facing vertices of some regions, near the lowest of them, in the frames given."""
+    """Downward-facing vertices of some regions, near the lowest of them, in the frames given.
+
+    A region that hangs clear of the lowest one, such as the calves below raised knees, rests on
+    nothing.
+    """
     touching = np.zeros(moving.vertices.shape[:2], dtype=bool)
+    everything = _columns(moving, *(name for group in _grouped(regions) for name in group))
+    bottom = moving.vertices[:, everything, 2].min(1, keepdims=True)
     for group in _grouped(regions):
         columns = _columns(moving, *group)
         height = moving.vertices[:, columns, 2]
         down = moving.normals[:, columns, 2] < -0.5
         lowest = np.where(down, height, np.inf).min(1, keepdims=True)
-        touching[:, columns] |= down & (height < lowest + SUPPORT_THICKNESS_M) & frames[:, None]
+        layer = down & (height < lowest + SUPPORT_THICKNESS_M) & (lowest < bottom + HANGING_M)
+        touching[:, columns] |= layer & frames[:, None]
     return touching
 
 
@@ -178,7 +190,7 @@ def seats_for(height: float) -> tuple[str, ...]:
     return tuple(sorted(usual, key=lambda name: abs(usual[name] - height)))
 
 
-_LYING = ("back", "buttocks|thigh_backs", "calves")
+_LYING = ("back", "buttocks|thigh_backs", "calves", "head")
 
 
 def _palm_supports(

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Integer
 
-from experiments.body.model import BodyModel
+from experiments.body.model import JOINT_NAMES, BodyModel
 from experiments.body.regions import contact_rows
 from experiments.motion.motion import Motion
 
@@ -23,8 +23,8 @@ class MovingBody:
     """Outward unit normals."""
     joints: Float[np.ndarray, "T 22 3"]
     times: Float[np.ndarray, " T"]
-    columns: dict[str, Integer[np.ndarray, " R"]]
-    """The body's regions as positions in `vertex_ids`."""
+    columns: dict[str, Integer[np.ndarray, " _"]]
+    """The body's regions, and its head, as positions in `vertex_ids`."""
 
     def speed(self, points: Float[np.ndarray, "T *N 3"]) -> Float[np.ndarray, "T *N"]:
         """Speed of points by central differences, m/s."""
@@ -52,13 +52,17 @@ def moving_body(motion: Motion, body: BodyModel) -> MovingBody:
     vertices = mesh.vertices.double().numpy()
     normals = _vertex_normals(vertices, np.searchsorted(ring, touching))
     columns = np.searchsorted(ring, ids)
+    regions = {name: np.flatnonzero(np.isin(ids, part)) for name, part in body.regions.items()}
+    joints = mesh.joints.double().numpy()
+    distance = np.linalg.norm(vertices[0, columns, None] - joints[0, None], axis=-1)
+    regions["head"] = np.flatnonzero(distance.argmin(1) == JOINT_NAMES.index("head"))
     return MovingBody(
         vertex_ids=ids,
         vertices=vertices[:, columns],
         normals=normals[:, columns],
-        joints=mesh.joints.double().numpy(),
+        joints=joints,
         times=motion.times,
-        columns={name: np.flatnonzero(np.isin(ids, part)) for name, part in body.regions.items()},
+        columns=regions,
     )
 
 
