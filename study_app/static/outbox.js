@@ -49,7 +49,7 @@ export class Outbox {
     try {
       const reply = await this.post(this.options.events, { events: batch });
       await reply.text(); // an unread reply would be cut off when the page is left
-      if (reply.status >= 500) throw new Error("server is away");
+      if (reply.status >= 500 || reply.status === 429) throw new Error("server is away");
       this.waiting.splice(0, batch.length);
     } catch {
       // Sent late, these reports cannot be timed by the server: they say so themselves.
@@ -67,8 +67,8 @@ export class Outbox {
     try {
       const reply = await this.post(this.options.answer, body);
       if (reply.status >= 500 || reply.status === 429) throw new Error("server is away");
+      const { next } = await reply.json(); // a reply that is not ours (a hotel's login page) is no reply
       sessionStorage.removeItem(this.key);
-      const { next } = await reply.json();
       if (reply.ok) this.options.onAnswered(next);
       else location.reload();
     } catch {

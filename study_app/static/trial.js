@@ -7,6 +7,7 @@
  */
 
 import { Outbox } from "./outbox.js";
+import { keepInStep } from "./step.js";
 import { ClipWatch } from "./watch.js";
 
 const SLOW_MS = 6000;
@@ -85,6 +86,7 @@ async function start(chosen) {
   try {
     await Promise.all(chosen.map((watch) => watch.ready()));
     await Promise.all(chosen.map((watch) => watch.play()));
+    if (chosen.length === 2) keepInStep(chosen);
   } catch (error) {
     if (error instanceof DOMException && error.name === "NotAllowedError") say(text("Blocked"));
   }
@@ -175,8 +177,13 @@ function failed() {
 }
 
 async function skip() {
-  const reply = await fetch(page.dataset.skipUrl ?? "", { method: "POST", headers: { "X-CSRFToken": csrf } });
-  if (reply.ok) location.replace((await reply.json()).next);
+  try {
+    const reply = await fetch(page.dataset.skipUrl ?? "", { method: "POST", headers: { "X-CSRFToken": csrf } });
+    if (reply.ok) location.replace((await reply.json()).next);
+    else location.reload();
+  } catch {
+    say(text("Offline"));
+  }
 }
 
 /** Keys act on the page only, never while a control has the focus, and can be switched off. */

@@ -6,11 +6,16 @@
 
 const COVERED = 0.95;
 const WALL = 0.9;
+const LOADING = 2; // HTMLMediaElement.NETWORK_LOADING
 
-/** Total length of the stretches. @param {TimeRanges} ranges */
-export function playedSeconds(ranges) {
+/** Length of the union of stretches. @param {[number, number][]} stretches begin and end in seconds */
+export function unionSeconds(stretches) {
   let total = 0;
-  for (let i = 0; i < ranges.length; i += 1) total += ranges.end(i) - ranges.start(i);
+  let reached = 0;
+  for (const [begin, end] of [...stretches].sort((a, b) => a[0] - b[0])) {
+    total += Math.max(0, end - Math.max(begin, reached));
+    reached = Math.max(reached, end);
+  }
   return total;
 }
 
@@ -27,15 +32,19 @@ export class ClipWatch {
     this.plays = 0;
     this.seen = false;
     this.spoiled = false;
+    this.held = false;
     this.stalls = 0;
     this.wallMs = 0;
     this.startedAt = 0;
     this.fastest = 1;
+    this.stretches = /** @type {[number, number][]} */ ([]); // of this view, closed by seeking
+    this.begin = 0;
+    this.position = 0;
     this.listen();
   }
 
   get playing() {
-    return !this.video.paused && !this.video.ended;
+    return this.held || (!this.video.paused && !this.video.ended);
   }
 
   get loaded() {
@@ -47,7 +56,7 @@ export class ClipWatch {
   }
 
   covered() {
-    return Math.min(1, playedSeconds(this.video.played) / this.duration);
+    return Math.min(1, unionSeconds([...this.stretches, [this.begin, this.position]]) / this.duration);
   }
 
   dropped() {
@@ -57,7 +66,8 @@ export class ClipWatch {
   listen() {
     const on = (name, handler) => this.video.addEventListener(name, handler);
     on("canplaythrough", () => this.page.changed());
-    on("timeupdate", () => this.page.changed());
+    on("timeupdate", () => this.moved());
+    on("seeking", () => this.jumped());
     on("ratechange", () => this.fast());
     on("waiting", () => this.stalled());
     on("pause", () => this.addWall());
@@ -70,7 +80,7 @@ export class ClipWatch {
   /** Resolves when the clip can run to its end, so that two clips start in step. */
   ready() {
     if (this.video.readyState >= 4) return Promise.resolve();
-    this.video.load();
+    if (this.video.networkState !== LOADING) this.video.load(); // some browsers wait for a gesture
     return new Promise((resolve, reject) => {
       this.video.addEventListener("canplaythrough", resolve, { once: true });
       this.video.addEventListener("error", reject, { once: true });
@@ -84,15 +94,44 @@ export class ClipWatch {
     this.fastest = 1;
     this.wallMs = 0;
     this.spoiled = document.hidden;
+    this.stretches = [];
+    this.begin = this.position = 0;
+    await this.video.play(); // fails where the browser blocks it: that was no view
     this.plays += 1;
-    await this.video.play();
     this.startedAt = performance.now();
     this.report("play", { view: this.plays });
     this.page.changed();
   }
 
   stop() {
+    this.held = false;
     if (this.playing) this.video.pause();
+  }
+
+  /** Wait for the other clip; this view goes on afterwards. */
+  hold() {
+    this.held = true;
+    this.video.pause();
+  }
+
+  async release() {
+    if (!this.held) return;
+    this.held = false;
+    await this.video.play().then(
+      () => (this.startedAt = performance.now()),
+      () => null // stopped meanwhile
+    );
+  }
+
+  moved() {
+    if (!this.video.seeking) this.position = this.video.currentTime;
+    this.page.changed();
+  }
+
+  /** What lay between the last known position and the new one was not seen. */
+  jumped() {
+    this.stretches.push([this.begin, this.position]);
+    this.begin = this.position = this.video.currentTime;
   }
 
   addWall() {
@@ -102,6 +141,7 @@ export class ClipWatch {
 
   complete() {
     this.addWall();
+    this.position = this.video.currentTime;
     const proof = {
       view: this.plays,
       covered: Math.round(1000 * this.covered()) / 1000,
@@ -128,7 +168,7 @@ export class ClipWatch {
   visibility() {
     if (document.hidden && this.playing) {
       this.spoiled = true;
-      this.video.pause();
+      this.stop();
       this.report("hidden", { view: this.plays });
     } else if (!document.hidden && this.spoiled) {
       this.page.hidden();
