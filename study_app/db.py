@@ -24,6 +24,7 @@ from renderer.files import InputError
 MIGRATIONS = Path(__file__).resolve().parents[1] / "migrations"
 _BUSY_MS = 10_000
 _ATTEMPTS = 5
+_PATIENCE_S = 10.0
 T = TypeVar("T")
 
 
@@ -57,14 +58,16 @@ class Database:
 
         That is: the database was busy, met a deadlock, or a unique key was taken a moment ago by
         another request; the next attempt finds what that one stored. `work` must be safe to run
-        again from the start: everything it did was rolled back.
+        again from the start: everything it did was rolled back. Whoever waited ten seconds is told;
+        the page sends again by itself.
         """
+        began = time.monotonic()
         for attempt in range(1, _ATTEMPTS + 1):
             try:
                 with self.write() as session:
                     return work(session)
             except (OperationalError, IntegrityError):
-                if attempt == _ATTEMPTS:
+                if attempt == _ATTEMPTS or time.monotonic() - began > _PATIENCE_S:
                     raise
                 time.sleep(0.02 * 2**attempt * random.uniform(0.5, 1.5))
         raise AssertionError("unreachable")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from flask import Flask, Response, jsonify, render_template, request
 from flask.typing import ResponseReturnValue
 from flask_wtf.csrf import CSRFError
-from sqlalchemy.exc import InterfaceError, OperationalError
+from sqlalchemy.exc import DataError, InterfaceError, OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeout
 from werkzeug.exceptions import HTTPException
 
 from study_app.services import Refused
@@ -42,6 +43,8 @@ def register(app: Flask) -> None:
     app.register_error_handler(CSRFError, lambda _: error_page("bad_request"))
     app.register_error_handler(OperationalError, _database_away)
     app.register_error_handler(InterfaceError, _database_away)
+    app.register_error_handler(PoolTimeout, _database_away)
+    app.register_error_handler(DataError, _impossible_value)
     app.register_error_handler(HTTPException, _http_error)
     app.register_error_handler(500, lambda _: error_page("error", 500))
 
@@ -71,6 +74,11 @@ def error_page(reason: str, status: int | None = None) -> ResponseReturnValue:
 def _database_away(error: Exception) -> ResponseReturnValue:
     """Locked, full or gone: nothing was stored halfway, so trying again is safe."""
     return error_page("error", 503)
+
+
+def _impossible_value(error: Exception) -> ResponseReturnValue:
+    """PostgreSQL takes no zero byte in a text: such an address or form was never given out by us."""
+    return error_page("not_found" if request.method == "GET" else "bad_request")
 
 
 def _http_error(error: HTTPException) -> ResponseReturnValue:

@@ -118,7 +118,7 @@ TEXTS: dict[str, str] = {
     "not_found_heading": "This page does not exist",
     "not_found_body": "Please check the link that you were given.",
     "error_heading": "Something went wrong on our side",
-    "error_body": "Nothing of what you answered is lost. Please try again in a moment.",
+    "error_body": "Nothing of what you answered is lost. Please load this page again in a moment.",
     "bad_request_heading": "That did not work",
     "bad_request_body": "The page may have been open for too long, or was opened in another window. "
     "Go back to the study and continue where you were.",

@@ -84,7 +84,7 @@ def _pause(config: StudyConfig, person: Participant, progress: Progress) -> str 
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)  # no database keeps NaN as JSON
 
 
 class AnswerBody(_Strict):

@@ -50,6 +50,8 @@ def _judge(play: Report | None, complete: Report, duration_s: float) -> Evidence
     if play is None or play.detail.get("queued") or complete.detail.get("queued"):
         return "unknown"  # the server's clock saw neither begin nor end of this view
     passed = (complete.received_at - play.received_at).total_seconds()
+    if passed < 0:
+        return "unknown"  # the server's clock was set back meanwhile
     return "proven" if passed >= WALL_SHARE * duration_s else "unproven"
 
 

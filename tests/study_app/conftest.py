@@ -57,10 +57,16 @@ def still_stimuli(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def postgresql_server() -> Iterator[str]:
-    """Gives the address of a cluster without a database name."""
+def postgresql_server() -> Iterator[Any]:
+    """Gives the address of a cluster without a database name; it can be stopped and started."""
     with _helper("postgres").postgresql_cluster() as address:
         yield address
+
+
+@pytest.fixture
+def own_postgresql() -> Callable[[], Any]:
+    """Makes a server that no other test needs meanwhile: `with own_postgresql() as cluster`."""
+    return _helper("postgres").postgresql_cluster  # type: ignore[no-any-return]
 
 
 _numbers = itertools.count()

@@ -30,8 +30,26 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+class Cluster(str):
+    """The address of a running server without a database, with the means to take it away."""
+
+    folder: Path
+    start_words: list[str]
+    stop_words: list[str]
+
+    def start(self) -> None:
+        self._run(self.start_words)
+
+    def stop(self) -> None:
+        """At once, as a crash would."""
+        self._run(self.stop_words)
+
+    def _run(self, words: list[str]) -> None:
+        subprocess.run(_as_postgres(words), check=True, stdout=subprocess.DEVNULL, cwd=self.folder)
+
+
 @contextmanager
-def postgresql_cluster() -> Iterator[str]:
+def postgresql_cluster() -> Iterator[Cluster]:
     """An own cluster on a free port, thrown away afterwards; gives its address without database."""
     programs = _postgresql_bin()
     folder = Path(tempfile.mkdtemp(prefix="pace-pg-"))
@@ -45,9 +63,12 @@ def postgresql_cluster() -> Iterator[str]:
     start = [*control, "-l", str(folder / "log"), "-o", options, "start"]
     quiet: dict[str, Any] = {"check": True, "stdout": subprocess.DEVNULL, "cwd": folder}
     subprocess.run(_as_postgres(initdb), **quiet)
-    subprocess.run(_as_postgres(start), **quiet)
+    cluster = Cluster(f"postgresql://pace@127.0.0.1:{port}")
+    cluster.folder, cluster.start_words = folder, start
+    cluster.stop_words = [*control, "-m", "immediate", "stop"]
+    cluster.start()
     try:
-        yield f"postgresql://pace@127.0.0.1:{port}"
+        yield cluster
     finally:
-        subprocess.run(_as_postgres([*control, "-m", "immediate", "stop"]), **quiet)
+        cluster.stop()
         shutil.rmtree(folder, ignore_errors=True)
