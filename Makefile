@@ -19,7 +19,7 @@ demo: setup ## Run the whole path once: place, render, ask, analyse (OUT=DIR)
 check: setup lint types layers docs test ## Everything that must be green: lint, types, layers, docs, tests
 
 check-slow: check ## The longer proofs beside the tests
-	$(PY) -m pytest -m slow -n 2 --timeout 5400
+	$(PY) -m pytest -m slow -n 2 --dist loadfile --timeout 5400
 
 lint: setup ## Style
 	.venv/bin/ruff check .
@@ -35,7 +35,7 @@ docs: setup ## Build the documents; a broken link is an error
 	.venv/bin/mkdocs build --strict --quiet
 
 test: setup ## All tests but the long proofs
-	$(PY) -m pytest -m "not slow" -n 2 --dist loadgroup
+	$(PY) -m pytest -m "not slow" -n 2 --dist loadfile
 
 bench: setup ## Benchmarks (AREA=renderer|analysis|...)
 	$(PY) -m tests.benchmarks $(AREA)

@@ -46,7 +46,7 @@ def build_set(
     folder.sweep()
     drops = folder.drops()
     renders = [job for job in render_jobs(config, folder) if job.key not in drops]
-    done = _run_all(run_render, renders, jobs, "render", progress)
+    done = run_all(run_render, renders, jobs, "render", progress)
     from experiments.assemble import assemble_catalogue
 
     catalogue = assemble_catalogue(config, folder)
@@ -67,8 +67,8 @@ def place_set(
     folder = SetFolder(out)
     folder.claim(config)
     prepares = [PrepareJob(config, scene) for scene in config.scenes]
-    _run_all(run_prepare, prepares, jobs, "prepare rooms", progress)
-    _run_all(run_place, place_jobs(config, folder), jobs, "place", progress)
+    run_all(run_prepare, prepares, jobs, "prepare rooms", progress)
+    run_all(run_place, place_jobs(config, folder), jobs, "place", progress)
     return folder
 
 
@@ -140,7 +140,7 @@ def validate_names(config: StimulusSetConfig) -> None:
         )
 
 
-def _run_all(
+def run_all(
     work: Callable[[Any], str],
     items: list[Any],
     jobs: int,
@@ -154,9 +154,9 @@ def _run_all(
     progress(stage, len(outcomes), len(items))
     if not waiting:
         return outcomes
-    # Spawn, because OpenGL contexts do not survive a fork; one room a process keeps memory flat.
-    context = get_context("spawn")
-    with ProcessPoolExecutor(jobs, mp_context=context, max_tasks_per_child=8) as pool:
+    # Spawn, because OpenGL contexts do not survive a fork. Workers are not replaced after some
+    # tasks: the pool of Python 3.11 and 3.12 can hang for ever when they are.
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         pending: set[Future[str]] = {pool.submit(work, item) for item in waiting}
         try:
             while pending:

@@ -27,9 +27,11 @@ class InputError(ValueError):
         super().__init__(f"{source}: {field}: got {shown}, wanted {wanted}".replace("\n", " "))
         self.source, self.field, self.value, self.wanted = str(source), field, value, wanted
 
-    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, object, str]]:
         # Exceptions cross process borders by their arguments, and ours are not the text.
-        return InputError, (self.source, self.field, str(self.value), self.wanted)
+        plain = isinstance(self.value, str | int | float | None)
+        value = self.value if plain else str(self.value)
+        return InputError, (self.source, self.field, value, self.wanted)
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from renderer.catalogue import read_catalogue, verify_catalogue
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "pace_study", "demo", "--json", "--out"]
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("demo")]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")

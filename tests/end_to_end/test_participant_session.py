@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import json
 import os
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -58,18 +60,33 @@ def pace(*words: object) -> str:
 class Study:
     """A study under way: its database, its address, its answers."""
 
-    def __init__(self, folder: Path, stimuli: Path) -> None:
+    def __init__(
+        self, folder: Path, stimuli: Path, extra: str = "", opened: bool = True, **env: str
+    ) -> None:
         self.folder = folder
         self.where = ("--database", f"sqlite:///{folder}/study.sqlite")
-        (folder / "study.toml").write_text(STUDY)
+        (folder / "study.toml").write_text(STUDY + extra)
         pace("study", "create", folder / "study.toml", "--catalogue", stimuli, *self.where)
-        pace("study", "open", "tiny", *self.where)
+        if opened:
+            self.open()
         words = ["-m", "pace_study", "serve", "--port", "0", "--json", *self.where]
         self.server = subprocess.Popen(
-            [sys.executable, *words], cwd=ROOT, stdout=subprocess.PIPE, text=True, env=os.environ
+            [sys.executable, *words],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=os.environ | env,
         )
         assert self.server.stdout is not None
         self.url = json.loads(self.server.stdout.readline())["url"] + "/s/tiny"
+
+    def open(self) -> None:
+        pace("study", "open", "tiny", *self.where)
+
+    def sql(self, command: str) -> None:
+        with closing(sqlite3.connect(self.folder / "study.sqlite")) as connection:
+            connection.execute(command)
+            connection.commit()
 
     def answers(self) -> list[dict[str, str]]:
         pace("study", "export", "tiny", "--out", self.folder / "out", *self.where)
@@ -266,35 +283,206 @@ def test_a_clip_that_cannot_be_had_is_told_and_may_be_skipped_after_a_second_try
     assert study.answers() == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_every_page_is_accessible_on_a_narrow_phone(
-    study: Study, visit: Callable[..., Page], scheme: str
+class Inspector:
+    """axe, the width, and a screenshot of a page in both themes."""
+
+    def __init__(self, page: Page, folder: Path) -> None:
+        self.page, self.folder = page, folder
+        self.checked: set[str] = set()
+
+    def __call__(self, name: str) -> None:
+        from axe_playwright_python.sync_playwright import Axe
+
+        for scheme in ("light", "dark"):
+            self.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+            found = Axe().run(self.page).response["violations"]
+            assert [(name, scheme, f["id"], f["nodes"][0]["html"]) for f in found] == []
+            self.page.screenshot(path=self.folder / f"{name}-{scheme}.png", full_page=True)
+        width = self.page.evaluate("() => document.documentElement.scrollWidth")
+        assert width <= self.page.viewport_size["width"], f"{name} is {width} px wide"
+        self.checked.add(name)
+
+
+def test_every_page_on_the_way_is_accessible_in_both_themes_on_a_narrow_phone(
+    tmp_path: Path, playing_stimuli: Path, visit: Callable[..., Page]
 ) -> None:
-    from axe_playwright_python.sync_playwright import Axe
-
-    page = visit(study.url, viewport={"width": 320, "height": 640}, color_scheme=scheme)
-    checked = []
-
-    def check(name: str) -> None:
-        found = Axe().run(page).response["violations"]
-        assert [(name, fault["id"], fault["nodes"][0]["html"]) for fault in found] == []
-        width = page.evaluate("() => document.documentElement.scrollWidth")
-        assert width <= 320, f"{name} is {width} px wide"
-        checked.append(name)
-
+    study = Study(tmp_path, playing_stimuli, "comprehension = true\ndemographics = true\n")
+    page = visit(study.url, viewport={"width": 320, "height": 640})
+    check = Inspector(page, tmp_path)
     check("consent")
     page.get_by_test_id("consent-agree").click()
+    page.wait_for_function("() => document.querySelector('[name=kbit]').value > 0")
     check("instructions")
+    page.set_viewport_size({"width": 320, "height": 300})
+    expect(page.get_by_test_id("begin")).to_be_disabled()
+    check("instructions-small")
+    page.set_viewport_size({"width": 320, "height": 640})
     page.get_by_test_id("begin").click()
+    check("demographics")
+    page.get_by_test_id("demographics-submit").click()
+    check("comprehension")
+    page.get_by_label("music").check()
+    page.get_by_test_id("comprehension-submit").click()
+    check("comprehension-again")
+    page.get_by_test_id("comprehension-right").check()
+    page.get_by_test_id("comprehension-submit").click()
     page.get_by_test_id("play-both").wait_for()
     check("trial")
     for _ in range(6):
         choose(page)
-        if page.get_by_test_id("practice-feedback").count() or page.locator("#pause").count():
-            check("trial with a notice")
+        for mark in ("[data-testid=practice-feedback]", "#pause"):
+            if page.locator(mark).count():
+                check("trial-" + ("break" if mark == "#pause" else "practised"))
     check("done")
+    page.locator("textarea").fill("All fine")
+    page.get_by_test_id("comments-submit").click()
+    check("done-noted")
     page.goto(study.url + "/withdraw")
     check("withdraw")
-    page.goto(study.url + "/none")
-    check("error")
-    assert len(checked) == 8
+    page.get_by_test_id("withdraw-confirm").click()
+    check("withdrawn")
+    study.stop()
+    assert len(check.checked) == 13
+
+
+def test_every_page_of_trouble_is_accessible_in_both_themes_and_helps(
+    tmp_path: Path, playing_stimuli: Path, visit: Callable[..., Page]
+) -> None:
+    limit = {"PACE_REQUESTS_PER_MINUTE": "100"}
+    study = Study(tmp_path, playing_stimuli, opened=False, **limit)
+    page = visit(study.url, viewport={"width": 320, "height": 640})
+    check = Inspector(page, tmp_path)
+
+    def meet(name: str, path: str, status: int, words: str) -> None:
+        reply = page.goto(study.url + path)
+        assert reply is not None and reply.status == status
+        expect(page.locator("main")).to_contain_text(words)
+        check(name)
+
+    meet("unopened", "", 409, "has not started yet")
+    study.open()
+    meet("not-found", "/none", 404, "check the link")
+    meet("stranger", "/withdraw", 400, "Go back to the study")
+    page.goto(study.url)
+    page.get_by_test_id("consent-agree").click()
+    study.sql("ALTER TABLE study_version RENAME TO away")
+    meet("database-away", "/session", 503, "Nothing of what you answered is lost")
+    study.sql("ALTER TABLE away RENAME TO study_version")
+    page.get_by_text("Back to the study").click()
+    page.get_by_test_id("begin").wait_for()
+    page.evaluate("async () => { for (let i = 0; i < 101; i += 1) await fetch('withdraw'); }")
+    meet("busy", "/withdraw", 429, "Wait a minute")
+    page.get_by_test_id("begin").or_(page.get_by_text("Back to the study")).click()
+    pace("study", "close", "tiny", *study.where)
+    meet("closed", "/session", 409, "no longer takes answers")
+    study.stop()
+    assert len(check.checked) == 6
+
+
+def test_a_clip_that_cannot_be_decoded_is_told(study: Study, visit: Callable[..., Page]) -> None:
+    page = visit(study.url)
+    page.get_by_test_id("consent-agree").click()
+    page.route(
+        "**/m/*", lambda route: route.fulfill(body=b"no video" * 99, content_type="video/mp4")
+    )
+    page.get_by_test_id("begin").click()
+    expect(page.locator("#status")).to_have_text("A clip could not be loaded.")
+    page.unroute("**/m/*")
+    page.locator("#retry").click()
+    choose(page)
+    assert len(study.answers()) == 1
+
+
+def test_a_hidden_page_a_blocked_start_and_a_jumping_clock_spoil_nothing_for_good(
+    study: Study, visit: Callable[..., Page]
+) -> None:
+    page = visit(study.url)
+    begin(page)
+    trial = trial_of(page)
+    page.evaluate(BLOCK_ONCE)
+    page.get_by_test_id("play-first").click()
+    expect(page.locator("#status")).to_contain_text("did not start the clips")
+    page.get_by_test_id("play-both").click()
+    page.wait_for_function("() => document.querySelector('#video-first').currentTime > 0.2")
+    page.evaluate(HIDE, True)
+    assert page.evaluate("() => [...document.querySelectorAll('video')].every(v => v.paused)")
+    page.evaluate(HIDE, False)
+    expect(page.locator("#status")).to_contain_text("was hidden")
+    expect(page.get_by_test_id("choose-first")).to_be_disabled()
+    page.evaluate("() => { const now = Date.now; Date.now = () => now() + 864e5; }")
+    choose(page)
+    assert trial_of(page) != trial
+    row = study.answers()[0]
+    assert (row["viewed_first"], row["plays_first"]) == ("proven", "2")
+    assert int(row["response_time_ms"]) < 60_000
+
+
+BLOCK_ONCE = """() => {
+  const video = document.querySelector('#video-first');
+  video.play = () => {
+    delete video.play;
+    return Promise.reject(new DOMException('no gesture', 'NotAllowedError'));
+  };
+}"""
+HIDE = """(hidden) => {
+  Object.defineProperty(document, 'hidden', { configurable: true, get: () => hidden });
+  document.dispatchEvent(new Event('visibilitychange'));
+}"""
+
+
+def test_the_back_button_leads_to_the_trial_that_is_due(
+    study: Study, visit: Callable[..., Page]
+) -> None:
+    page = visit(study.url)
+    begin(page)
+    choose(page)
+    due = trial_of(page)
+    for _ in range(2):
+        page.go_back()
+        page.goto(study.url)
+        assert trial_of(page) == due
+    page.go_back(wait_until="load")
+    page.wait_for_function(f"() => document.querySelector('#trial')?.dataset.trial === '{due}'")
+    assert len(study.answers()) == 1
+
+
+def test_a_database_that_is_locked_for_a_while_loses_and_doubles_nothing(
+    study: Study, visit: Callable[..., Page]
+) -> None:
+    page = visit(study.url)
+    begin(page)
+    trial = trial_of(page)
+    page.get_by_test_id("play-both").click()
+    page.get_by_test_id("choose-second").click()
+    lock = sqlite3.connect(study.folder / "study.sqlite")
+    lock.execute("BEGIN EXCLUSIVE")
+    page.get_by_test_id("confirm").click()
+    expect(page.locator("#status")).to_contain_text("No connection", timeout=25_000)
+    lock.rollback()
+    lock.close()
+    leave(page, trial)
+    assert [row["chosen_position"] for row in study.answers()] == ["second"]
+
+
+def test_clips_that_run_apart_are_brought_back_in_step(
+    study: Study, visit: Callable[..., Page]
+) -> None:
+    page = visit(study.url)
+    begin(page)
+    page.get_by_test_id("play-both").click()
+    page.wait_for_function("() => document.querySelector('#video-first').currentTime > 0.1")
+    page.locator("#video-second").evaluate("v => { v.pause(); setTimeout(() => v.play(), 200); }")
+    apart = page.evaluate(MEASURE_DRIFT)
+    assert apart < 0.08, "they ended within about a frame of each other"
+
+
+MEASURE_DRIFT = """() => new Promise((resolve) => {
+  const [one, two] = document.querySelectorAll('video');
+  let last = 1;
+  const look = () => {
+    if (one.ended || two.ended) resolve(last);
+    else if (!one.seeking) last = Math.abs(one.currentTime - two.currentTime);
+    if (!one.ended && !two.ended) requestAnimationFrame(look);
+  };
+  look();
+})"""

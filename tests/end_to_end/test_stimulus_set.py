@@ -17,7 +17,6 @@ from renderer.catalogue import read_catalogue, verify_catalogue
 
 ROOT = Path(__file__).resolve().parents[2]
 
-pytestmark = pytest.mark.xdist_group("stimulus_set")
 
 CONFIG = """
 set_id = "small"

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "tutorial" / "first-study.md"
 FENCE = re.compile(r'```(toml|sh)(?: title="([^"]+)")?\n(.*?)```', re.DOTALL)
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tutorial")]
+pytestmark = pytest.mark.slow
 
 
 def _command(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
