@@ -40,6 +40,8 @@ class Checks(_Strict):
 
     min_window_width: int = Field(default=320, ge=0, le=4000)
     min_window_height: int = Field(default=400, ge=0, le=4000)
+    min_kbit_s: int = Field(default=0, ge=0, le=100_000)
+    """Speed of the line; 0 = measured and kept, nobody turned away."""
     comprehension: bool = False
     """One question about the task before the first trial."""
     break_every: int = Field(default=20, ge=0, le=1000)

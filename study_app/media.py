@@ -6,6 +6,7 @@ token. Byte ranges are served (Safari plays nothing without them, and the cache 
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from flask import Blueprint, Response, send_file, session
@@ -19,6 +20,15 @@ from study_app.tokens import token_hash
 
 clips = Blueprint("media", __name__)
 PLAYABLE = ("leased", "shown", "expired")
+
+_LINE = os.urandom(192 * 1024)
+"""Something that no one can compress: 1.6 s at 1 Mbit/s."""
+
+
+@clips.get("/line")
+def line() -> Response:
+    """Bytes for the page to time the line by."""
+    return Response(_LINE, mimetype="application/octet-stream")
 
 
 @clips.get("/m/<token>")

@@ -226,7 +226,7 @@ def step(study_id: str, name: str) -> ResponseReturnValue:
 def _step_detail(name: str, config: StudyConfig) -> dict[str, Any] | None:
     """What to keep of a step's form; None = not passed, show the page again."""
     if name == "instructions":
-        sizes = {key: _small_number(request.form.get(key)) for key in ("width", "height", "kbit_s")}
+        sizes = {key: _small_number(request.form.get(key)) for key in ("width", "height", "kbit")}
         return {key: value for key, value in sizes.items() if value is not None}
     if name == "comprehension":
         if request.form.get("answer") != "right":

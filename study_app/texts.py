@@ -38,6 +38,9 @@ TEXTS: dict[str, str] = {
     "{min_width} x {min_height}. Please enlarge the window or use a larger screen.",
     "check_no_video": "This browser cannot play the clips (H.264 video in MP4). Please use a "
     "current version of Chrome, Edge, Firefox or Safari.",
+    "check_slow": "Your connection carries about {kbit} kbit/s at the moment; this study needs about "
+    "{min_kbit}. Please use another connection, or load this page again later.",
+    "check_measuring": "Looking at your connection; this takes a few seconds.",
     "check_continue": "Continue",
     # comprehension
     "comprehension_heading": "One question before you start",

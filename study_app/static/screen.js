@@ -1,28 +1,33 @@
 // @ts-check
-/** The look at the screen before a study begins: large enough, and able to play the clips? */
+/** The look at window, browser and line before a study begins, with reasons where it cannot. */
+
+import { fill, lineSpeed, obstacle } from "./check.js";
 
 const form = /** @type {HTMLFormElement} */ (document.getElementById("screen"));
 const message = /** @type {HTMLElement} */ (document.getElementById("screen-message"));
 const begin = /** @type {HTMLButtonElement} */ (form.querySelector("button"));
-
-/** @returns {string} why the study cannot begin here, or nothing */
-function obstacle() {
-  const { minWidth, minHeight, small = "", noVideo = "" } = form.dataset;
-  if (!document.createElement("video").canPlayType('video/mp4; codecs="avc1.42E01E"')) return noVideo;
-  const tooSmall = innerWidth < Number(minWidth) || innerHeight < Number(minHeight);
-  if (!tooSmall) return "";
-  const values = { width: innerWidth, height: innerHeight, min_width: minWidth, min_height: minHeight };
-  return Object.entries(values).reduce((text, [name, value]) => text.replace(`{${name}}`, String(value)), small);
-}
+const wanted = {
+  min_width: Number(form.dataset.minWidth),
+  min_height: Number(form.dataset.minHeight),
+  min_kbit: Number(form.dataset.minKbit),
+};
+const plays = document.createElement("video").canPlayType('video/mp4; codecs="avc1.42E01E"') !== "";
+let measuring = true;
+let kbit = /** @type {number | null} */ (null);
 
 function check() {
-  const reason = obstacle();
-  message.textContent = reason;
+  const found = { width: Math.round(innerWidth), height: Math.round(innerHeight), kbit, plays };
+  const reason = obstacle(found, wanted) || (measuring && wanted.min_kbit ? "measuring" : "");
+  const text = fill(form.dataset[reason] ?? "", { ...found, ...wanted });
+  if (message.textContent !== text) message.textContent = text;
   message.hidden = reason === "";
   begin.disabled = reason !== "";
-  form.elements["width"].value = Math.round(innerWidth);
-  form.elements["height"].value = Math.round(innerHeight);
+  for (const name of ["width", "height", "kbit"]) form.elements[name].value = found[name] ?? "";
 }
 
 addEventListener("resize", check);
 check();
+void lineSpeed(form.dataset.lineUrl ?? "").then((speed) => {
+  [kbit, measuring] = [speed, false];
+  check();
+});

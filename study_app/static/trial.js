@@ -38,6 +38,7 @@ let paintedAt = 0;
 let allowedAt = 0;
 let failures = 0;
 let stallText = false;
+let blocked = false;
 
 const watches = Object.fromEntries(
   ["first", "second"].map((position) => {
@@ -83,12 +84,14 @@ function enhance() {
 async function start(chosen) {
   for (const watch of both) if (!chosen.includes(watch)) watch.stop();
   endBreak();
+  blocked = false;
   try {
     await Promise.all(chosen.map((watch) => watch.ready()));
     await Promise.all(chosen.map((watch) => watch.play()));
     if (chosen.length === 2) keepInStep(chosen);
   } catch (error) {
-    if (error instanceof DOMException && error.name === "NotAllowedError") say(text("Blocked"));
+    blocked = error instanceof DOMException && error.name === "NotAllowedError";
+    update();
   }
 }
 
@@ -117,6 +120,7 @@ function update() {
 }
 
 function statusText(allowed) {
+  if (blocked) return text("Blocked");
   if (allowed) return text("Choose");
   if (both.some((watch) => watch.spoiled && !watch.seen && !watch.playing)) return text("Hidden");
   if (!both.every((watch) => watch.loaded)) return stallText ? text("Slow") : text("Loading");

@@ -20,7 +20,7 @@ def node(*words: object) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("name", ["outbox", "step", "watch"])
+@pytest.mark.parametrize("name", ["check", "outbox", "step", "watch"])
 def test_a_module_of_the_page_passes_its_own_tests(name: str) -> None:
     told = node("--test", "--test-reporter=tap", PAGE / f"{name}.test.mjs")
     assert "# fail 0" in told and "# pass 0" not in told
