@@ -133,31 +133,32 @@ def clustered_covariance(
     return full
 
 
-def two_way_covariance(
+def two_way_covariances(
     duels: Duels, scale: Scale, people: Int[np.ndarray, "D"], stimuli: Int[np.ndarray, "D"]
-) -> Float[np.ndarray, "K K"]:
-    """Participant x stimulus clustered covariance; negative eigenvalues are set to zero.
+) -> tuple[Float[np.ndarray, "K K"], ...]:
+    """Covariances of the abilities: participant x stimulus, by participant, by stimulus.
 
-    With a single participant or stimulus nothing can be clustered: that of independent answers.
+    A variance is the largest that the three give (`centred`), as in the preference table, because
+    the two-way sum can fall below its parts. With a single participant or stimulus nothing can be
+    clustered: only that of independent answers.
     """
     if people.max() == 0 or stimuli.max() == 0:
-        return scale.covariance
+        return (scale.covariance,)
     both = np.unique(
         people.astype(np.int64) * (int(stimuli.max()) + 1) + stimuli, return_inverse=True
     )[1]
     a, b, c = (clustered_covariance(duels, scale, groups) for groups in (people, stimuli, both))
-    values, vectors = np.linalg.eigh(a + b - c)
-    return np.asarray((vectors * np.maximum(values, 0)) @ vectors.T)
+    return a + b - c, a, b
 
 
 def centred(
-    scale: Scale, covariance: Float[np.ndarray, "K K"]
+    scale: Scale, *covariances: Float[np.ndarray, "K K"]
 ) -> tuple[Float[np.ndarray, "K"], Float[np.ndarray, "K"]]:
-    """Abilities relative to their mean, and their standard errors."""
+    """Abilities relative to their mean, and their standard errors: the largest of all covariances."""
     count = len(scale.ability)
     centring = np.eye(count) - 1 / count
-    spread = np.diag(centring @ covariance @ centring.T)
-    return centring @ scale.ability, np.sqrt(np.maximum(spread, 0))
+    spreads = [np.diag(centring @ covariance @ centring.T) for covariance in covariances]
+    return centring @ scale.ability, np.sqrt(np.maximum(np.max(spreads, axis=0), 0))
 
 
 def quasi_variances(covariance: Float[np.ndarray, "K K"]) -> Float[np.ndarray, "K"]:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from analysis.claims_text import Lines, Sentence, sentences
-from analysis.results import Results
+from analysis.results import Results, comparison_label, method_label
 from renderer.files import InputError
 
 Verdict = Literal["OK", "MISMATCH", "UNMATCHED"]
@@ -28,7 +28,19 @@ _COUNT = re.compile(
     r"\b(\d[\d,]*)\s+(?:\w+\s+)?(participants|raters|subjects|observers|answers|responses|judg\w+)"
 )
 _TOTAL = re.compile(r"took part|in total|total of|altogether|overall", re.I)
-PREFERENCE = ("prefer", "of the time", "chose", "natural", "favour", "favor", "picked", "voted")
+PREFERENCE = (
+    "prefer",
+    "of the time",
+    "chose",
+    "natural",
+    "favour",
+    "favor",
+    "picked",
+    "voted",
+    " wins ",
+    " won ",
+    " beat",
+)
 
 
 @dataclass(frozen=True)
@@ -75,6 +87,7 @@ def read_claim_names(path: Path) -> ClaimNames:
     for key in record:
         if key not in known:
             raise InputError(path, "key", key, ", ".join(sorted(known)))
+    _check_types(path, record)
     aliases: dict[str, str] = {}
     results: dict[str, str] = {}
     for name, entry in record.get("comparison", {}).items():
@@ -90,12 +103,26 @@ def read_claim_names(path: Path) -> ClaimNames:
     )  # fmt: skip
 
 
+def _check_types(path: Path, record: dict[str, Any]) -> None:
+    for key in ("target", "ignore"):
+        words = record.get(key, [])
+        if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+            raise InputError(path, key, words, "a list of phrases")
+    answers = record.get("answers")
+    if answers is not None and (type(answers) is not int or answers < 1):
+        raise InputError(path, "answers", answers, "a whole number from 1")
+    if not isinstance(record.get("comparison", {}), dict):
+        raise InputError(path, "comparison", record["comparison"], "tables [comparison.NAME]")
+
+
 def names_from_results(results: Results) -> ClaimNames:
     """Names when there is no `claims.toml`: those of the results themselves."""
     names = results["order"]
+    shown = {_squeeze(comparison_label(results, name)): name for name in names}
+    targets = [*results["targets"], *(method_label(results, t) for t in results["targets"])]
     return ClaimNames(
-        {_squeeze(name): name for name in names}, {name: name for name in names},
-        tuple(_squeeze(name) for name in results["targets"]),
+        shown | {_squeeze(name): name for name in names}, {name: name for name in names},
+        tuple(_squeeze(name) for name in targets),
     )  # fmt: skip
 
 
@@ -131,7 +158,9 @@ def _find(
 
     for match in numbers:
         ignored = any(word in _clause(text, match.start()) for word in names.ignore)
-        found = _attached(match.start(), marks, mentions) if preference and not ignored else None
+        found = (
+            _attached(text, match.start(), marks, mentions) if preference and not ignored else None
+        )
         one = claim("percentage", match.group(1), match.start(), found)
         if column is not None and found is not None:
             mine = text.count("&", 0, match.start()) == column
@@ -139,20 +168,20 @@ def _find(
         yield one
     for match in _RANGE.finditer(text):
         if match.span() in taken:
-            found = _attached(match.start(), [match.start()], mentions)
+            found = _attached(text, match.start(), [match.start()], mentions)
             yield claim("interval", f"{match.group(1)}–{match.group(2)}", match.start(), found)
     for match in _P.finditer(text):
-        found = _attached(match.start(), [m.start() for m in _P.finditer(text)], mentions)
+        found = _attached(text, match.start(), [m.start() for m in _P.finditer(text)], mentions)
         yield claim("p", f"p {match.group(1)} {match.group(2)}", match.start(), found)
     yield from _find_counts(text, claim, mentions)
 
 
 def _find_counts(text: str, claim: Any, mentions: list[tuple[int, int, str]]) -> Iterator[Claim]:
     for match in _OF.finditer(text):
-        found = _attached(match.start(), [match.start()], mentions)
+        found = _attached(text, match.start(), [match.start()], mentions)
         yield claim("count", f"{match.group(1)} of {match.group(2)}", match.start(), found)
     for match in _N.finditer(text):
-        found = _attached(match.start(), [match.start()], mentions)
+        found = _attached(text, match.start(), [match.start()], mentions)
         yield claim("count", f"n = {match.group(1)}", match.start(), found)
     for match in _COUNT.finditer(text):
         if not any(m.start() <= match.start() < m.end() for m in _OF.finditer(text)):
@@ -171,7 +200,9 @@ def _mentions(text: str, names: ClaimNames) -> list[tuple[int, int, str]]:
     return sorted(found)
 
 
-def _attached(at: int, marks: list[int], mentions: list[tuple[int, int, str]]) -> str | None:
+def _attached(
+    text: str, at: int, marks: list[int], mentions: list[tuple[int, int, str]]
+) -> str | None:
     """The comparison a number speaks of.
 
     Where every number of the sentence has a comparison named after it ("60 % over A, 70 % over B"),
@@ -181,9 +212,26 @@ def _attached(at: int, marks: list[int], mentions: list[tuple[int, int, str]]) -
     before = [name for start, _, name in mentions if start < at]
     after = [name for start, _, name in mentions if at < start < following]
     all_follow = sum(start > min(marks) for start, _, _ in mentions) >= len(marks)
+    if before and after and _only_one_reaches(text, at, mentions):
+        return after[0] if _reaches(text[at : _next_start(mentions, at)]) else before[-1]
     if after and (all_follow or not before):
         return after[0]
     return before[-1] if before else None
+
+
+def _only_one_reaches(text: str, at: int, mentions: list[tuple[int, int, str]]) -> bool:
+    """Is exactly one of the neighbouring names in the same clause as the number?"""
+    last = max(end for start, end, _ in mentions if start < at)
+    return _reaches(text[last:at]) != _reaches(text[at : _next_start(mentions, at)])
+
+
+def _next_start(mentions: list[tuple[int, int, str]], at: int) -> int:
+    return min(start for start, _, _ in mentions if start > at)
+
+
+def _reaches(between: str) -> bool:
+    """No comma, bracket or contrast between a name and a number."""
+    return not re.search(r"[,;:)&]|\b(?:and|whereas|while|but)\b", between)
 
 
 def _clause(text: str, at: int) -> str:

@@ -168,12 +168,16 @@ def plan(
         )
         return
     click.echo(planner.plan_table(design, forecasts))
-    floor = ", ".join(
-        f"{planner.independent_answers(rate, 0.8)} for {rate:.1%}" for rate in rates if rate != 0.5
-    )
-    click.echo(
-        f"If answers were independent (they are not), 80 % power would take {floor or 'no'} answers."
-    )
+    floors = [
+        f"{planner.independent_answers(rate, 0.8)} answers for {rate:.1%}"
+        for rate in rates
+        if rate != 0.5
+    ]
+    if floors:
+        click.echo(
+            "If answers were independent (they are not), 80 % power would take "
+            f"{', '.join(floors)}."
+        )
 
 
 COMMANDS = {"analyze": analyze, "check-claims": check_claims, "plan": plan}

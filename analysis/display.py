@@ -51,6 +51,11 @@ def fixed(value: float | None, digits: int = 2) -> str:
     return round_half_up(Fraction(Decimal(repr(float(value)))), digits).replace("-", "−")
 
 
+def span(low: int | str, high: int | str, between: str = " to ") -> str:
+    """`60 to 64`, or `64` where both ends are the same."""
+    return str(low) if low == high else f"{low}{between}{high}"
+
+
 def holding(count: int, singular: str, plural: str | None = None) -> str:
     """`1 answer`, `2 answers`."""
     return f"{count:,} {singular if count == 1 else plural or singular + 's'}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,14 @@ from analysis.plausibility import link, link_metrics, split_ceiling
 from analysis.preference import Comparison, comparisons, preference_table, stimulus_codes
 from analysis.resampling import bootstrap_rates
 from analysis.responses import Responses, read_responses
-from analysis.results import RESULTS_VERSION, Results, preference_record, versions, watermark
+from analysis.results import (
+    RESULTS_VERSION,
+    Results,
+    comparison_label,
+    preference_record,
+    versions,
+    watermark,
+)
 from analysis.sensitivity import sensitivity_matrix
 from renderer.catalogue import Catalogue, read_catalogue
 
@@ -45,6 +53,7 @@ def estimate(
     found = comparisons(analysed)
     results = _provenance(responses_csv, everything, mode, codebook, seed)
     results |= {
+        "names": _display_names(scored, analysed),
         "targets": sorted({one.target for one in found}), "flow": asdict(flow),
         "quality": _quality(analysed, found),
         "reliability": _reliability(responses, analysed, found, seed),
@@ -79,6 +88,20 @@ def _provenance(
         "simulated": mode == "simulated", "frozen": codebook.frozen,
         "watermark": watermark(mode, codebook.frozen),
     }  # fmt: skip
+
+
+def _display_names(catalogue: Catalogue | None, analysed: Responses) -> dict[str, str]:
+    """Display names of the compared methods, for reading only; a name that two methods share is left out."""
+    used = np.union1d(analysed.codes["target"], analysed.codes["baseline"])
+    present = {analysed.labels["target"][code] for code in used}
+    stated = {
+        str(method.get("name")): method.get("display_name")
+        for method in (catalogue.methods if catalogue is not None else ())
+        if isinstance(method, dict) and method.get("name") in present
+    }
+    names = {name: shown for name, shown in stated.items() if isinstance(shown, str)}
+    shared = Counter([*names.values(), *(present - names.keys())])
+    return {name: shown for name, shown in sorted(names.items()) if shared[shown] == 1}
 
 
 def _preference(
@@ -208,12 +231,13 @@ def _scale(analysed: Responses, found: list[Comparison]) -> dict[str, Any]:
     if people.max() == 0 or stimuli.max() == 0:
         flags = [*flags, "one participant or stimulus only: errors assume independent answers"]
     record["flags"] += flags
-    covariance = scaling.two_way_covariance(duels, fit, people, stimuli)
-    ability, se = scaling.centred(fit, covariance)
+    ability, se = scaling.centred(fit, *scaling.two_way_covariances(duels, fit, people, stimuli))
+    t = float(stats.t.ppf(0.5 + LEVEL / 2, max(1, min(people.max(), stimuli.max()))))
     record["methods"] = [
-        {"method": name, "ability": float(a), "se": float(s)}
+        {"method": name, "ability": float(a), "se": float(s),
+         "ci": [float(a - t * s), float(a + t * s)]}
         for name, a, s in sorted(zip(names, ability, se, strict=True), key=lambda row: -row[1])
-    ]
+    ]  # fmt: skip
     if fit.order is not None:
         record["order_effect"] = {"log_odds": fit.order, "se_independent": fit.order_se}
     circular, complete = scaling.circular_triads(duels, len(names))
@@ -281,6 +305,9 @@ def _metrics(
 def _warnings(results: Results, flow: Flow, codebook: Codebook) -> list[str]:
     """What a reader must not miss, in plain sentences."""
     lines = []
+    if codebook.unknown_fields:
+        fields = ", ".join(codebook.unknown_fields)
+        lines.append(f"codebook.json holds fields that are not known and were not used: {fields}.")
     if codebook.rules_origin == "post hoc":
         lines.append("The exclusion rules were changed after collection began: post hoc.")
     if len(results["input"]["study_versions"]) > 1:
@@ -293,7 +320,7 @@ def _warnings(results: Results, flow: Flow, codebook: Codebook) -> list[str]:
         )
     for name in results["order"]:
         lines += [
-            f"FRAGILE: {name}, {row['variant']}: the {row['flips']} changes."
+            f"FRAGILE: {comparison_label(results, name)}, {row['variant']}: the {row['flips']} changes."
             for row in results["sensitivity"][name]
             if row["flips"] and _matters(results["baselines"][name]["ci"], row["ci"])
         ]

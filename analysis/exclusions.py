@@ -42,7 +42,11 @@ def select_mode(responses: Responses, mode: str | None) -> tuple[Responses, str,
     """Answers of one mode, because modes never mix: the one asked for, else live, else the only one."""
     counts = {m: int(responses.equals("mode", m).sum()) for m in responses.labels["mode"]}
     counts = {name: count for name, count in counts.items() if count}
-    chosen = mode or ("live" if "live" in counts or len(counts) > 1 else next(iter(counts)))
+    if mode is None and "live" not in counts and len(counts) > 1:
+        raise InputError(
+            responses.source, "mode", ", ".join(sorted(counts)), "one of them, chosen with --mode"
+        )
+    chosen = mode or ("live" if "live" in counts else next(iter(counts)))
     if chosen not in counts:
         raise InputError(responses.source, "mode", chosen, f"one of {', '.join(sorted(counts))}")
     rest = {name: count for name, count in counts.items() if name != chosen}

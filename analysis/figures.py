@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from analysis.results import Results, ordered
+from analysis.results import Results, comparison_label, method_label, ordered, target_labels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,8 +77,11 @@ def forest(results: Results) -> Figure:
         text = f"{shown['rate']} % [{shown['ci'].replace('–', ', ')}]"
         axes.text(102, place, text, va="center", ha="left", fontsize=8.5)
     axes.axvline(50, color=GREY, lw=1, ls=":", zorder=1)
-    _share_axis(axes, f"answers in favour of {', '.join(results['targets'])} (%)")
-    axes.set_yticks(range(len(rows)), [_label(name, f"n = {row['n']:,}") for name, row in rows])
+    _share_axis(axes, f"answers in favour of {target_labels(results)} (%)")
+    axes.set_yticks(
+        range(len(rows)),
+        [_label(comparison_label(results, name), f"n = {row['n']:,}") for name, row in rows],
+    )
     axes.set_ylim(len(rows) - 0.45, -0.55)
     legend = "thick: clustered interval    dashed: assumes independent answers"
     axes.set_title(legend, fontsize=7.5, color=GREY, loc="left")
@@ -99,8 +102,11 @@ def shares(results: Results) -> Figure:
     axes.axvline(0, color="black", lw=0.8)
     axes.set_xlim(-118, 118)
     axes.set_xticks([-100, -50, 0, 50, 100], ["100", "50", "0", "50", "100"])
-    axes.set_xlabel(f"chose the other (%)      chose {', '.join(results['targets'])} (%)")
-    axes.set_yticks(range(len(rows)), [_label(name, f"n = {row['n']:,}") for name, row in rows])
+    axes.set_xlabel(f"chose the other (%)      chose {target_labels(results)} (%)")
+    axes.set_yticks(
+        range(len(rows)),
+        [_label(comparison_label(results, name), f"n = {row['n']:,}") for name, row in rows],
+    )
     axes.set_ylim(len(rows) - 0.5, -0.5)
     _bare_left(axes)
     return figure
@@ -120,7 +126,9 @@ def scene_panels(results: Results) -> Figure:
             place = names.index(scene["scene"])
             axes.plot([100 * b for b in scene["ci"]], [place, place], color=INK, lw=2, zorder=2)
             axes.plot(100 * scene["rate"], place, "o", color=INK, ms=4.5, zorder=3, clip_on=False)
-        axes.set_title(_label(name, f"n = {row['n']:,}"), fontsize=8.5, loc="left")
+        axes.set_title(
+            _label(comparison_label(results, name), f"n = {row['n']:,}"), fontsize=8.5, loc="left"
+        )
         _share_axis(axes, "")
         axes.set_xticks([0, 50, 100])
         axes.set_yticks(range(len(names)), names)
@@ -129,7 +137,7 @@ def scene_panels(results: Results) -> Figure:
         axes.tick_params(labelbottom=True)  # the lowest panel of every column
     for axes in grid[len(rows) :]:
         axes.set_visible(False)
-    figure.supxlabel(f"answers in favour of {', '.join(results['targets'])} (%)", fontsize=9)
+    figure.supxlabel(f"answers in favour of {target_labels(results)} (%)", fontsize=9)
     return figure
 
 
@@ -154,10 +162,11 @@ def participant_dots(results: Results) -> Figure:
             )
         axes.plot(100 * row["rate"], place + 0.42, "^", color=SECOND, ms=6, clip_on=False)
     axes.axvline(50, color=GREY, lw=1, ls=":", zorder=0)
-    _share_axis(
-        axes, f"answers of one participant in favour of {', '.join(results['targets'])} (%)"
-    )
-    labels = [_label(name, f"{row['participants']} participants") for name, row in rows]
+    _share_axis(axes, f"answers of one participant in favour of {target_labels(results)} (%)")
+    labels = [
+        _label(comparison_label(results, name), f"{row['participants']} participants")
+        for name, row in rows
+    ]
     axes.set_yticks(range(len(rows)), labels)
     axes.set_ylim(len(rows) - 0.42, -0.5)
     return figure
@@ -179,10 +188,11 @@ def stimulus_dots(results: Results) -> Figure:
                 axes.plot(100 * pooled, place - 0.15, "o", color=INK, ms=4, mew=0, zorder=3)
             axes.plot(raw, place + 0.2, "o", mfc="white", mec=GREY, ms=4, zorder=2, clip_on=False)
     axes.axvline(50, color=GREY, lw=1, ls=":", zorder=0)
-    _share_axis(
-        axes, f"answers about one stimulus in favour of {', '.join(results['targets'])} (%)"
-    )
-    labels = [_label(name, f"{len(row['stimuli_rates'])} stimuli") for name, row in rows]
+    _share_axis(axes, f"answers about one stimulus in favour of {target_labels(results)} (%)")
+    labels = [
+        _label(comparison_label(results, name), f"{len(row['stimuli_rates'])} stimuli")
+        for name, row in rows
+    ]
     axes.set_yticks(range(len(rows)), labels)
     axes.set_ylim(len(rows) - 0.55, -0.5)
     return figure
@@ -193,13 +203,14 @@ def scale(results: Results) -> Figure:
     methods = results["scale"]["methods"]
     figure, axes = _canvas(7.2, 0.6 + 0.36 * len(methods))
     for place, row in enumerate(methods):
-        half = 1.96 * row["se"]
         hollow = "white" if row["method"] in results["targets"] else INK
-        ends = [row["ability"] - half, row["ability"] + half]
-        axes.plot(ends, [place, place], color=INK, lw=2, zorder=2)
+        axes.plot(row["ci"], [place, place], color=INK, lw=2, zorder=2)
         axes.plot(row["ability"], place, "o", mfc=hollow, mec=INK, ms=6.5, zorder=3)
     axes.axvline(0, color=GREY, lw=1, ls=":", zorder=0)
-    axes.set_yticks(range(len(methods)), [textwrap.fill(row["method"], 30) for row in methods])
+    axes.set_yticks(
+        range(len(methods)),
+        [textwrap.fill(method_label(results, row["method"]), 30) for row in methods],
+    )
     axes.set_ylim(len(methods) - 0.5, -0.5)
     axes.set_xlabel("ability (log odds, relative to the mean method)")
     _bare_left(axes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from analysis.results import Results
+from analysis.results import Results, comparison_label, target_labels
 
 _DIGITS = ("Zero", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
 _FIELDS = {
@@ -25,15 +25,18 @@ def escape(text: str) -> str:
 
 
 def macro_stems(names: list[str]) -> dict[str, str]:
-    """A macro stem of letters only for every name; clashes get a letter at the end."""
-    stems: dict[str, str] = {}
+    """A macro stem of letters only for every name; clashes get a number in words."""
+    stems: dict[str, str] = {"": "Study"}  # the stem of the macros of the flow
     for name in names:
         words = re.findall(r"[A-Za-z]+|[0-9]", name.replace("+", " Plus "))
         stem = "".join(_DIGITS[int(w)] if w.isdigit() else w[0].upper() + w[1:] for w in words)
-        stem, clash = stem or "Method", 0
-        while stem + ("ABCDEFGHIJKLMNOPQRSTUVWXYZ"[clash - 1] if clash else "") in stems.values():
+        base = stem = stem or "Method"
+        clash = 0
+        while stem in stems.values():
             clash += 1
-        stems[name] = stem + ("ABCDEFGHIJKLMNOPQRSTUVWXYZ"[clash - 1] if clash else "")
+            stem = base + "".join(_DIGITS[int(digit)] for digit in str(clash))
+        stems[name] = stem
+    del stems[""]
     return stems
 
 
@@ -54,11 +57,11 @@ def macros(results: Results) -> str:
 def preference_tex(results: Results) -> str:
     """The main table (booktabs); wants `results.tex` to be read first. Both shares of a row are printed."""
     stems = macro_stems(results["order"])
-    rows = [_row(name, stem) for name, stem in stems.items()]
+    rows = [_row(comparison_label(results, name), stem) for name, stem in stems.items()]
     mark = f"\\textbf{{{escape(results['watermark'])}}} " if results["watermark"] else ""
     flow, level = results["flow"], f"{results['level'] * 100:g}"
     caption = (
-        f"{mark}Preference for {escape(', '.join(results['targets']))}. "
+        f"{mark}Preference for {escape(target_labels(results))}. "
         f"{level}\\,\\% intervals and $p$: participant $\\times$ stimulus cluster-robust on the logit scale, "
         f"$p$ Holm-adjusted. \\StudyAnswers{{}} answers of \\StudyParticipants{{}} participants, "
         f"{flow['rows'] - flow['analysed']} of {flow['rows']} rows not analysed (rules "
@@ -72,12 +75,13 @@ def preference_tex(results: Results) -> str:
     ])  # fmt: skip
 
 
-def _row(name: str, stem: str) -> str:
+def _row(label: str, stem: str) -> str:
+    # The empty group keeps a name that begins with [ or * from being read as an option of \\.
     def use(field: str) -> str:
         return f"\\{stem}{field}{{}}"
 
     cells = [
-        escape(name), use("Answers"), use("BaselineRate") + r"\,\%",
+        "{}" + escape(label), use("Answers"), use("BaselineRate") + r"\,\%",
         rf"\textbf{{{use('Rate')}\,\%}}", f"{use('Low')}--{use('High')}", use("PHolm"), use("Deff"),
     ]  # fmt: skip
     return " & ".join(cells) + r" \\"

@@ -5,8 +5,9 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
-from analysis.display import DASH, fixed, p_value, percent, percent_interval
-from analysis.results import Results, ordered
+from analysis.clustered import FEW_CLUSTERS, few_clusters
+from analysis.display import DASH, fixed, p_value, percent, percent_interval, span
+from analysis.results import Results, comparison_label, method_label, ordered
 from analysis.tables import Table
 
 Rows = tuple[tuple[str, ...], ...]
@@ -18,7 +19,7 @@ def interval_table(results: Results) -> Table:
     for name, row in ordered(results):
         mixed = row["mixed_model"]
         rows.append((
-            name, f"{row['k']:,} / {row['n']:,}", row["display"]["ci"],
+            comparison_label(results, name), f"{row['k']:,} / {row['n']:,}", row["display"]["ci"],
             row["display"]["ci_participant"], percent_interval(row["ci_bootstrap"]),
             f"{percent(mixed['rate'])} [{percent_interval(mixed['ci'])}]" if "rate" in mixed else DASH,
             row["display"]["ci_naive"], row["display"]["ci_exact"],
@@ -41,7 +42,7 @@ def effect_table(results: Results) -> Table:
     """Tests, effect sizes and how strongly answers hang together."""
     rows = tuple(
         (
-            name, f"{row['participants']:,}", f"{row['stimuli']:,}",
+            comparison_label(results, name), f"{row['participants']:,}", f"{row['stimuli']:,}",
             row["display"]["answers_per_stimulus"], str(row["df"]), row["display"]["p"],
             row["display"]["odds"], row["display"]["cohen_h"],
             row["display"]["jod"], row["display"]["icc_participant"],
@@ -65,9 +66,10 @@ def effect_table(results: Results) -> Table:
 def difference_table(results: Results) -> Table:
     """Differences between rows, participants resampled for both at once."""
     rows = tuple(
-        (f"{d['first']} − {d['second']}", points(d["difference"]), points_interval(d["ci"]))
+        (" − ".join(comparison_label(results, d[side]) for side in ("first", "second")),
+         points(d["difference"]), points_interval(d["ci"]))
         for d in results["differences"]
-    )
+    )  # fmt: skip
     header = ("difference of rates", "points", f"{results['level'] * 100:g} % CI")
     note = (
         "Percentage points; bootstrap of participants. Exploratory: not adjusted for their number."
@@ -84,7 +86,7 @@ def scene_table(results: Results) -> Table:
         cells = [_scene(found.get(scene)) for scene in names]
         test = row["heterogeneity"]
         p = p_value(test["p"]) if test["p"] is not None else f"{DASH} ({test['why']})"
-        rows.append((name, *cells, p))
+        rows.append((comparison_label(results, name), *cells, p))
     note = (
         "Rate in % [clustered interval]; few clips a scene make these intervals wide. Last "
         "column: Wald F test that "
@@ -99,7 +101,7 @@ def quality_table(results: Results) -> Table:
     quality = results["quality"]
     return Table(
         "quality", "Quality of the answers", ("check", "value", "detail"),
-        (*_side_rows(quality), *_exposure_rows(quality), *_time_rows(quality)),
+        (*_side_rows(quality), *_exposure_rows(results), *_time_rows(quality)),
         words=True,
     )  # fmt: skip
 
@@ -107,7 +109,8 @@ def quality_table(results: Results) -> Table:
 def sensitivity_table(results: Results) -> Table:
     """The matrix of variants; the last column says what flips."""
     rows = [
-        (f"{name}: {v['variant']}", f"{v['n']:,}", percent(v["rate"]), percent_interval(v["ci"]),
+        (f"{comparison_label(results, name)}: {v['variant']}", f"{v['n']:,}",
+         percent(v["rate"]), percent_interval(v["ci"]),
          v["flips"] or "no")
         for name in results["order"]
         for v in results["sensitivity"][name]
@@ -127,8 +130,12 @@ def scale_table(results: Results) -> Table:
     """Bradley-Terry abilities relative to their mean."""
     scale = results["scale"]
     rows = tuple(
-        (row["method"], fixed(row["ability"]), fixed(row["se"])) for row in scale["methods"]
-    )
+        (
+            method_label(results, row["method"]), fixed(row["ability"]), fixed(row["se"]),
+            " to ".join(fixed(bound) for bound in row["ci"]),
+        )
+        for row in scale["methods"]
+    )  # fmt: skip
     notes = [f"{flag[0].upper()}{flag[1:]}." for flag in scale["flags"]]
     if scale["order_effect"]:
         effect = scale["order_effect"]
@@ -146,12 +153,13 @@ def scale_table(results: Results) -> Table:
             f"{scale['complete_triads']}."
         )
     notes.append(
-        "Log odds relative to the mean method; errors clustered by participant and stimulus."
+        "Log odds relative to the mean method; intervals clustered by participant and stimulus, "
+        "Student's t."
     )
     return Table(
         "scale",
         "Scale of all methods (Bradley-Terry)",
-        ("method", "ability", "SE"),
+        ("method", "ability", "SE", f"{results['level'] * 100:g} % CI"),
         rows,
         " ".join(notes),
     )
@@ -161,7 +169,7 @@ def reliability_table(results: Results) -> Table:
     """Agreement between participants per row, and within participants."""
     rows: list[tuple[str, ...]] = [
         (
-            name, str(found["stimuli"]), _rate(found["agreement"]),
+            comparison_label(results, name), str(found["stimuli"]), _rate(found["agreement"]),
             fixed(found["alpha"], 3), fixed(found["ac1"], 3),
         )
         for name, found in sorted(results["reliability"]["between"].items(), key=_in_order(results))
@@ -188,10 +196,14 @@ def reliability_table(results: Results) -> Table:
 def metric_table(results: Results) -> Table:
     """Does a difference in a metric go with preference?"""
     metrics = results["metrics"]
-    rows = tuple((name, *_metric_cells(record)) for name, record in metrics["metrics"].items())
+    rows = tuple(
+        (name, *_metric_cells(record))
+        for name, record in metrics["metrics"].items()
+        if not record["why"]
+    ) or tuple((name, *[DASH] * 7) for name in metrics["metrics"])
     header = (
-        "metric", "stimuli", "range of difference", "slope per SD", "p", "Kendall tau", "higher chosen %",
-         "CI", "ties",
+        "metric", "pairs", "range of difference", "slope per SD", "p", "Kendall tau",
+        "higher chosen %", "ties",
     )  # fmt: skip
     return Table(
         "metrics", "Do the metrics predict preference?", header, rows, _metric_note(metrics)
@@ -236,15 +248,16 @@ def _side_rows(quality: dict[str, Any]) -> Rows:
     return tuple(rows)
 
 
-def _exposure_rows(quality: dict[str, Any]) -> Rows:
+def _exposure_rows(results: Results) -> Rows:
     return tuple(
         (
-            f"{name}: exposure", f"{record['min']}–{record['max']} answers a stimulus",
+            f"{comparison_label(results, name)}: exposure",
+            f"{span(record['min'], record['max'], '–')} answers a stimulus",
             f"target first in {percent(Fraction(record['target_first'], record['n']))} %; chosen "
             f"{_rate(record['rate_when_first'])} % when first, "
             f"{_rate(record['rate_when_second'])} % when second",
         )
-        for name, record in quality["exposure"].items()
+        for name, record in results["quality"]["exposure"].items()
     )  # fmt: skip
 
 
@@ -274,18 +287,16 @@ def _rate(value: float | None) -> str:
 
 
 def _metric_cells(record: dict[str, Any]) -> tuple[str, ...]:
-    if record["why"]:
-        spread = f"{record['min']:.3g}" if "min" in record else DASH
-        return (str(record["items"]), spread, record["why"], *[DASH] * 5)
-    slope = DASH
+    slope = "separated"
     if record["slope_per_sd"] is not None:
         slope = f"{fixed(record['slope_per_sd'])} [{fixed(record['ci'][0])} to {fixed(record['ci'][1])}]"
     predicted = record["predicted"]
     return (
         str(record["items"]), f"{record['min']:.3g} to {record['max']:.3g}".replace("-", "−"), slope,
         DASH if record["p"] is None else p_value(record["p"]), fixed(record["kendall"]),
-        DASH if predicted is None else percent(predicted),
-        DASH if predicted is None else percent_interval(record["predicted_ci"]), f"{record['ties']:,}",
+        DASH if predicted is None
+        else f"{percent(predicted)} [{percent_interval(record['predicted_ci'])}]",
+        f"{record['ties']:,}",
     )  # fmt: skip
 
 
@@ -294,13 +305,26 @@ def _metric_note(metrics: dict[str, Any]) -> str:
         return f"Not computed: {metrics['why']}."
     ceiling = metrics["ceiling"]
     note = (
-        "Difference: target − baseline clip of a pair. Slope: log odds per standard deviation "
-        "within comparisons, "
-        "clustered. Higher chosen: share of answers for the clip with the higher value; ties are "
-        "not scored. "
+        "Difference: target − baseline clip of a pair. Slope: log odds of choosing the target per "
+        "standard deviation, one intercept a comparison, clustered by participant and stimulus. Higher "
+        "chosen: share of answers for the clip with the higher value; ties are not scored. "
+        "Exploratory: p is not adjusted for the number of metrics. "
     )
     if ceiling["share"] is not None:
         note += f"Ceiling: the majority of the other participants predicts {percent(ceiling['share'])} %. "
     if "from_repeats" in ceiling:
-        note += f"Ceiling from repeated trials: {percent(ceiling['from_repeats'])} %."
-    return note
+        note += f"Ceiling from repeated trials: {percent(ceiling['from_repeats'])} %. "
+    fewest = min((r["clusters"] for r in metrics["metrics"].values() if not r["why"]), default=None)
+    if fewest is not None and fewest < FEW_CLUSTERS:
+        note += f"FEW CLUSTERS: {few_clusters(fewest)}. "
+    return note + _refusals(metrics["metrics"])
+
+
+def _refusals(records: dict[str, Any]) -> str:
+    """Metrics that say nothing here, grouped by the reason."""
+    reasons: dict[str, list[str]] = {}
+    for name, record in records.items():
+        if record["why"]:
+            at = f" ({record['min']:.3g})" if "min" in record else ""
+            reasons.setdefault(record["why"], []).append(name + at.replace("-", "−"))
+    return " ".join(f"Not measurable, {why}: {', '.join(who)}." for why, who in reasons.items())

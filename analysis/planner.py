@@ -20,6 +20,9 @@ from analysis.clustered import clustered_rate
 from analysis.glmm import marginal_rate
 from renderer.files import InputError
 
+LARGEST_SD = 5.0
+"""Beyond this spread (log odds) nearly everyone always answers the same."""
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -64,6 +67,11 @@ def check_plan(plan: Plan, source: object = "plan") -> None:
         raise InputError(source, "pool", plan.pool, f"at least the {plan.answers} answers")
     if not 0 <= plan.dropout < 1:
         raise InputError(source, "dropout", plan.dropout, "a share from 0 to below 1")
+    for name in ("sd_participant", "sd_stimulus"):
+        if not 0 <= getattr(plan, name) <= LARGEST_SD:
+            raise InputError(
+                source, name, getattr(plan, name), f"a number from 0 to {LARGEST_SD:g}"
+            )
     for name in ("participants", "answers"):
         if getattr(plan, name) < 2:
             raise InputError(source, name, getattr(plan, name), "at least 2")

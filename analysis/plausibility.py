@@ -17,6 +17,9 @@ from analysis.clustered import clustered_rate
 from analysis.preference import Comparison
 from renderer.catalogue import Catalogue
 
+ROUNDING = 1e-9
+"""Differences of scores below this are rounding, not differences."""
+
 
 @dataclass(frozen=True)
 class Linked:
@@ -26,6 +29,8 @@ class Linked:
     participant: Int[np.ndarray, "N"]
     item: Int[np.ndarray, "N"]
     """(comparison, stimulus) of the answer: what the participant saw."""
+    stimulus: Int[np.ndarray, "N"]
+    """Scene and motion, the cluster of every estimator; several comparisons share one."""
     comparison: Int[np.ndarray, "N"]
     deltas: dict[str, Float[np.ndarray, "I"]]
     """Per metric, the difference of every item; not-a-number where a clip lacks the score."""
@@ -78,13 +83,17 @@ def link(
                 both = target.get(name, np.nan) - baseline.get(name, np.nan)
                 deltas[name].append(float(both))
         parts.append(
-            (one.won, participants[one.rows], local + items, np.full(len(one.won), number))
-        )
+            (one.won, participants[one.rows], local + items, stimuli[one.rows],
+             np.full(len(one.won), number))
+        )  # fmt: skip
         items += len(used)
-    won, people, item, comparison = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Linked(
-        won, people, item, comparison, {name: np.array(value) for name, value in deltas.items()}
+    won, people, item, stimulus, comparison = (
+        np.concatenate(column) for column in zip(*parts, strict=True)
     )
+    return Linked(
+        won, people, item, stimulus, comparison,
+        {name: np.array(value) for name, value in deltas.items()},
+    )  # fmt: skip
 
 
 def clustered_slope(
@@ -136,16 +145,19 @@ def _one_metric(linked: Linked, delta: Float[np.ndarray, "I"], level: float) -> 
     if known.sum() < 3:
         return record | {"why": "fewer than 3 stimuli with this score for both methods"}
     record |= {"min": float(delta[known].min()), "max": float(delta[known].max())}
-    if np.ptp(delta[known]) < 1e-12:
-        return record | {
-            "why": "the difference is the same for all stimuli: no association to measure"
-        }
+    if np.ptp(delta[known]) < ROUNDING:
+        return record | {"why": "the difference is the same for all pairs"}
     rows = known[linked.item]
     item, won, people = linked.item[rows], linked.won[rows], linked.participant[rows]
+    if won.all() or not won.any():
+        return record | {"why": "all answers are the same"}
+    stimulus = linked.stimulus[rows]
+    clusters = min(len(np.unique(people)), len(np.unique(stimulus)))
+    record["clusters"] = clusters
     x = delta[item] / delta[known].std()
-    slope = clustered_slope(x, won, linked.comparison[rows], (people, item))
+    slope = clustered_slope(x, won, linked.comparison[rows], (people, stimulus))
     if slope is not None:
-        df = min(len(np.unique(people)), len(np.unique(item))) - 1
+        df = clusters - 1
         half = float(stats.t.ppf(0.5 + level / 2, max(df, 1))) * slope[1]
         p = float(2 * stats.t.sf(abs(slope[0]) / slope[1], max(df, 1))) if slope[1] > 0 else 1.0
         record |= {"slope_per_sd": slope[0], "p": p, "ci": [slope[0] - half, slope[0] + half]}
@@ -154,18 +166,18 @@ def _one_metric(linked: Linked, delta: Float[np.ndarray, "I"], level: float) -> 
     if np.ptp(rates) > 0:
         tau = stats.kendalltau(delta[used], rates)
         record |= {"kendall": float(tau.statistic), "p_kendall": float(tau.pvalue)}
-    return record | _predicted(delta[item], won, people, item, level)
+    return record | _predicted(delta[item], won, people, stimulus, level)
 
 
 def _predicted(
     delta: Float[np.ndarray, "N"], won: Bool[np.ndarray, "N"], people: Int[np.ndarray, "N"],
-    item: Int[np.ndarray, "N"], level: float,
+    stimulus: Int[np.ndarray, "N"], level: float,
 ) -> dict[str, Any]:  # fmt: skip
     """Share of answers that chose the clip with the higher value; ties are counted, not scored."""
-    decided = np.abs(delta) > 1e-12
+    decided = np.abs(delta) > ROUNDING
     ties = int((~decided).sum())
     if not decided.any():
         return {"ties": ties}
     hit = (delta > 0)[decided] == won[decided]
-    rate = clustered_rate(count_cells(people[decided], item[decided], hit), level)
+    rate = clustered_rate(count_cells(people[decided], stimulus[decided], hit), level)
     return {"ties": ties, "predicted": rate.rate, "predicted_ci": list(rate.ci)}

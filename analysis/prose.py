@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from analysis.display import holding, p_value, percent, percent_interval
-from analysis.results import Results, ordered
+from analysis.display import fixed, holding, p_value, percent, percent_interval, span
+from analysis.results import Results, comparison_label, method_label, ordered
 from analysis.tables import all_tables, markdown
 
 
@@ -15,18 +15,16 @@ def methods_paragraph(results: Results) -> str:
     sentences = [
         f"{holding(flow['analysed_participants'], 'participant')} gave "
         f"{holding(flow['analysed'], 'answer')} in a "
-        f"two-alternative forced choice between {_list(results['targets'])} and each of "
-        f"{_list(_baselines(results))}.",
+        f"two-alternative forced choice between {_methods(results, results['targets'])} and "
+        f"{'each of ' if len(_baselines(results)) > 1 else ''}{_methods(results, _baselines(results))}.",
         _exclusion_sentence(results),
         "For each comparison we report the share of answers in favour of the target with a "
         f"{level} confidence interval "
         "that is robust to clustering by participant and by stimulus (logit scale, CR1 sandwich "
         "variance of both "
-        "clusterings less that of their intersection, Student's t with one degree of freedom "
-        "less than the smaller "
-        "number of clusters), and a two-sided p value against 50 % from the same model, adjusted "
-        "by Holm's method over "
-        f"{holding(len(results['order']), 'comparison')}.",
+        "clusterings less that of their intersection, never less than either, Student's t with one "
+        "degree of freedom less than the smaller number of clusters), and a two-sided p value against "
+        f"50 % from the same model{_holm(results)}.",
     ]
     if any("rate" in row["mixed_model"] for _, row in ordered(results)):
         sentences.append(
@@ -35,8 +33,8 @@ def methods_paragraph(results: Results) -> str:
             "approximation) and averaged their rates over both."
         )
     sentences.append(
-        f"Differences between comparisons use {results['bootstraps']:,} bootstrap draws of participants "
-        f"(seed {results['seed']})."
+        f"Bootstrap intervals of the rates{' and of their differences' if results['differences'] else ''}"
+        f" use {results['bootstraps']:,} draws of participants (seed {results['seed']})."
     )
     if results["metrics"]["metrics"]:
         sentences.append(
@@ -74,11 +72,13 @@ def markdown_report(results: Results) -> str:
 def results_paragraph(results: Results) -> str:
     """The result in one sentence per comparison, strongest first."""
     sentences = []
+    named: set[str] = set()
     for _, row in ordered(results):
         shown, test = row["display"], f"p = {row['display']['p_holm']}".replace("= <", "< ")
         verdict = "" if row["p_holm"] < 1 - results["level"] else "; not distinguishable from 50 %"
         sentences.append(
-            f"Against {row['baseline']}, {row['target']} was chosen in {shown['rate']} % of "
+            f"Against {_mention(results, row['baseline'], named)}, "
+            f"{_mention(results, row['target'], named)} was chosen in {shown['rate']} % of "
             f"{holding(row['n'], 'answer')} "
             f"[{shown['ci']}], {test}{verdict}."
         )
@@ -94,19 +94,22 @@ def checklist(results: Results) -> tuple[tuple[str, str], ...]:
     return (
         ("Are answers treated as independent?",
          "No. Headline intervals cluster by participant and stimulus; design effects "
-         + (f"{min(effects):.1f} to {max(effects):.1f}." if effects else "not estimable.")),
+         + (f"{span(fixed(min(effects), 1), fixed(max(effects), 1))}." if effects else "not estimable.")),
         ("Does the result generalise over stimuli?",
          f"Over stimuli like these: {_span(rows, 'stimuli')} stimuli a comparison are part of the "
          "variance. "
          "Not over scenes: they are fixed."),
-        ("Multiple comparisons?", f"Holm over {holding(len(rows), 'comparison')}."),
+        ("Multiple comparisons?",
+         f"p adjusted by Holm's method over {len(rows)} comparisons." if len(rows) > 1
+         else "There is one comparison; its p needs no adjustment."),
         ("Were exclusions decided before the data were seen?", _exclusion_answer(results)),
         ("Were sides counterbalanced?",
-         "; ".join(f"{name}: target first in {percent(e['target_first'] / e['n'])} %"
+         "; ".join(f"{comparison_label(results, name)}: target first in "
+                   f"{percent(e['target_first'] / e['n'])} %"
                    for name, e in quality["exposure"].items())
          + f". The first position was chosen in {percent(side['rate'])} % [{percent_interval(side['ci'])}]."),
         ("How often was each clip rated?",
-         "; ".join(f"{name}: {e['min']} to {e['max']} times"
+         "; ".join(f"{comparison_label(results, name)}: {span(e['min'], e['max'])} times"
                    for name, e in quality["exposure"].items()) + "."),
         ("Does the result hold in every scene?", _scene_answer(results)),
         ("Does it hang on one rule, person, clip or scene?", _sensitivity_answer(results)),
@@ -129,19 +132,35 @@ def _baselines(results: Results) -> list[str]:
     return sorted({row["baseline"] for row in results["baselines"].values()})
 
 
+def _methods(results: Results, methods: list[str]) -> str:
+    return _list([method_label(results, method) for method in methods])
+
+
+def _mention(results: Results, method: str, named: set[str]) -> str:
+    """The name of a method, with its identifier the first time."""
+    first = method not in named
+    named.add(method)
+    return method_label(results, method, with_id=first)
+
+
+def _holm(results: Results) -> str:
+    many = len(results["order"])
+    return f", adjusted by Holm's method over {many} comparisons" if many > 1 else ""
+
+
 def _list(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _span(rows: list[dict[str, Any]], key: str) -> str:
     low, high = min(row[key] for row in rows), max(row[key] for row in rows)
-    return str(low) if low == high else f"{low} to {high}"
+    return span(low, high)
 
 
 def _exclusion_sentence(results: Results) -> str:
     flow = results["flow"]
     if not results["rules"]:
-        return "No exclusion rules were declared and nobody was excluded."
+        return "No exclusion rules were declared and no answer was excluded."
     people = sum(flow["excluded_participants"].values())
     answers = sum(flow["excluded_answers"].values())
     rules = ", ".join(f"{name} = {value:g}" for name, value in results["rules"].items())
@@ -153,6 +172,8 @@ def _exclusion_sentence(results: Results) -> str:
 
 
 def _exclusion_answer(results: Results) -> str:
+    if not results["rules"] and results["rules_origin"] == "declared":
+        return "The study design declares no rules; nothing was excluded."
     texts = {
         "none": "No rules were declared; nothing was excluded.",
         "post hoc": "NO: the rules were changed after collection began (post hoc).",
@@ -167,13 +188,17 @@ def _scene_answer(results: Results) -> str:
         rates = [scene["rate"] for scene in row["scenes"]]
         p = row["heterogeneity"]["p"]
         test = f", equality p = {p_value(p)}".replace("= <", "< ") if p is not None else ""
-        parts.append(f"{name}: {percent(min(rates))} to {percent(max(rates))} %{test}")
+        label, between = (
+            comparison_label(results, name),
+            span(percent(min(rates)), percent(max(rates))),
+        )
+        parts.append(f"{label}: {between} %{test}")
     return "; ".join(parts) + "."
 
 
 def _sensitivity_answer(results: Results) -> str:
     flips = [
-        f"{name} ({row['variant']}: {row['flips']})"
+        f"{comparison_label(results, name)} ({row['variant']}: {row['flips']})"
         for name in results["order"]
         for row in results["sensitivity"][name]
         if row["flips"]

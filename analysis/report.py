@@ -15,7 +15,7 @@ _SECTIONS = (
     ("Methods", (), ()),
     ("How sure is it?", ("intervals", "effects", "differences"), ("participants",)),
     ("Scenes and stimuli", ("scenes",), ("scenes", "stimuli")),
-    ("From the file to the analysis", ("flow", "quality"), ()),
+    ("Data and their quality", ("flow", "quality"), ()),
     ("Does it hang on something?", ("sensitivity",), ()),
     ("Agreement and scale", ("reliability", "scale"), ("scale",)),
     ("Link to the metrics", ("metrics",), ()),

@@ -91,8 +91,10 @@ def _check_header(source: Path) -> None:
             header = next(csv.reader(stream), [])
     except FileNotFoundError:
         raise InputError(source, "file", "missing", "an existing responses.csv") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(source, "row 1", str(error), "a header in UTF-8") from None
+    except UnicodeDecodeError as error:
+        raise _broken(source, str(error)) from None
+    except (OSError, csv.Error) as error:
+        raise InputError(source, "row 1", str(error), "a header") from None
     for name in header:
         if name not in _BY_NAME:
             raise InputError(source, "row 1, column", name, "only the columns of responses.csv")
@@ -115,11 +117,29 @@ def _chunks(source: Path) -> Iterator[pd.DataFrame]:
             )  # fmt: skip
     except pd.errors.EmptyDataError:
         return
-    except pd.errors.ParserWarning:
-        raise InputError(source, "rows", "too many cells", f"{len(COLUMNS)} cells a row") from None
-    except (pd.errors.ParserError, UnicodeDecodeError) as error:
-        message = str(error).replace("Error tokenizing data. C error: ", "").strip()
-        raise InputError(source, "rows", message, f"{len(COLUMNS)} cells a row in UTF-8") from None
+    except (pd.errors.ParserWarning, pd.errors.ParserError, UnicodeDecodeError) as error:
+        raise _broken(source, str(error)) from None
+
+
+def _broken(source: Path, message: str) -> InputError:
+    """Names the first row that cannot be read, which the fast parser's own message does not."""
+    wanted = f"{len(COLUMNS)} cells in UTF-8, quotes closed"
+    with source.open("rb") as stream:
+        for number, line in enumerate(stream, 1):
+            try:
+                line.decode("utf-8-sig")
+            except UnicodeDecodeError as error:
+                byte = f"byte 0x{line[error.start]:02x}"
+                return InputError(source, f"row {number}", byte, wanted)
+    with source.open(newline="", encoding="utf-8-sig") as text:
+        last = 0
+        try:
+            for last, cells in enumerate(csv.reader(text, strict=True), 1):
+                if len(cells) != len(COLUMNS):
+                    return InputError(source, f"row {last}", f"{len(cells)} cells", wanted)
+        except csv.Error as error:
+            return InputError(source, f"row {last + 1}", str(error), wanted)
+    return InputError(source, "rows", message, wanted)
 
 
 class _Columns:

@@ -34,6 +34,24 @@ def ordered(results: Results) -> list[tuple[str, dict[str, Any]]]:
     return [(name, results["baselines"][name]) for name in results["order"]]
 
 
+def method_label(results: Results, method: str, with_id: bool = False) -> str:
+    """The catalogue's display name of a method where there is one, else its identifier."""
+    shown = str(results.get("names", {}).get(method, method))
+    return f"{shown} ({method})" if with_id and method not in shown else shown
+
+
+def comparison_label(results: Results, name: str, with_id: bool = False) -> str:
+    """A comparison as readers see it: the baseline, or `target vs baseline` with several targets."""
+    row = results["baselines"][name]
+    methods = [row["baseline"]] if name == row["baseline"] else [row["target"], row["baseline"]]
+    return " vs ".join(method_label(results, method, with_id) for method in methods)
+
+
+def target_labels(results: Results) -> str:
+    """The methods under study, for titles and axes."""
+    return ", ".join(method_label(results, target) for target in results["targets"])
+
+
 def versions() -> dict[str, str]:
     """Version of this product and of the libraries whose numbers and drawings it passes on."""
     return {name: metadata.version(name) for name in ("pace-study", *_LIBRARIES)}

@@ -74,6 +74,7 @@ def _threshold(source: object, name: str, value: Any) -> float:
     if name not in RULE_NAMES:
         raise InputError(source, field, value, f"one of the rules {', '.join(RULE_NAMES)}")
     rule = RULES[RULE_NAMES.index(name)]
-    if not isinstance(value, (int, float)) or not rule.low <= value <= rule.high:
+    on_off = isinstance(value, bool) and rule.removes == "participant"
+    if on_off or not isinstance(value, (int, float)) or not rule.low <= value <= rule.high:
         raise InputError(source, field, value, f"a number from {rule.low:g} to {rule.high:g}")
     return float(value)

@@ -9,7 +9,8 @@ import textwrap
 from dataclasses import dataclass
 from typing import Any
 
-from analysis.results import Results, ordered
+from analysis.display import holding
+from analysis.results import Results, comparison_label, ordered, target_labels
 from analysis.rules import RULES, Rule
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -33,7 +34,8 @@ def preference_table(results: Results) -> Table:
     level = f"{results['level'] * 100:g} %"
     rows = tuple(
         (
-            name, f"{row['n']:,}", row["display"]["baseline_rate"], row["display"]["rate"],
+            comparison_label(results, name, with_id=True),
+            f"{row['n']:,}", row["display"]["baseline_rate"], row["display"]["rate"],
             row["display"]["ci"], row["display"]["p_holm"], row["display"]["design_effect"],
             row["display"]["ci_naive"],
         )
@@ -50,14 +52,27 @@ def preference_note(results: Results) -> str:
     """What the columns of the main table mean, and on how many people and stimuli they rest."""
     flow = results["flow"]
     notes = [
-        f"Target: {', '.join(results['targets'])}. Intervals: participant x stimulus cluster-robust "
+        f"Target: {target_labels(results)}. Intervals: participant x stimulus cluster-robust "
         "on the logit scale; p against 50 % from the same model, Holm-adjusted over the rows.",
         "* Wilson; assumes independent answers.",
-        f"{flow['analysed']:,} answers of {flow['analysed_participants']} participants analysed; "
-        f"{flow['rows']:,} rows read.",
+        _conservation(flow),
     ]
-    notes += [f"{name}: {flag}." for name, row in ordered(results) for flag in row["flags"]]
+    notes += [
+        f"{comparison_label(results, name)}: {flag}."
+        for name, row in ordered(results)
+        for flag in row["flags"]
+    ]
     return " ".join(notes)
+
+
+def _conservation(flow: dict[str, Any]) -> str:
+    """Every row of the file in one sum: analysed, or left out for a reason."""
+    people = holding(flow["analysed_participants"], "participant")
+    gone = [f"{count:,} mode {mode}" for mode, count in flow["other_mode"].items()]
+    gone += [f"{count:,} {kind}" for kind, count in flow["other_kind"].items()]
+    gone += [f"{count:,} excluded by {rule}" for rule, count in flow["excluded_answers"].items()]
+    total = " + ".join([f"{flow['analysed']:,} answers of {people} analysed", *gone])
+    return f"{holding(flow['rows'], 'row')} = {total}."
 
 
 def flow_table(results: Results) -> Table:
@@ -101,19 +116,21 @@ def all_tables(results: Results) -> list[Table]:
 
 
 def terminal_table(results: Results) -> str:
-    """The main table as plain text of at most 100 columns, with watermark and notes."""
+    """The main table as plain text of about 100 columns, with watermark, notes and loud lines."""
     mark = results["watermark"]
-    title = f"Preference for {', '.join(results['targets'])}" + (f"   [{mark}]" if mark else "")
+    title = f"Preference for {target_labels(results)}" + (f"   [{mark}]" if mark else "")
     table = preference_table(results)
     short = tuple(name.replace("design effect", "deff") for name in table.header)
-    return "\n".join([title, *_aligned((short, *table.rows)), *_wrapped(table.note, 100)])
+    loud = [line for text in results["warnings"] for line in _wrapped(f"! {text}", 100)]
+    return "\n".join([title, *_aligned((short, *table.rows)), *_wrapped(table.note, 100), *loud])
 
 
 def markdown(table: Table, mark: str) -> str:
     """A pipe table under its title."""
     cells = [[_escape_pipe(cell) for cell in row] for row in (table.header, *table.rows)]
     lines = ["| " + " | ".join(row) + " |" for row in cells]
-    lines.insert(1, "|---" + "|---:" * (len(table.header) - 1) + "|")
+    rule = "|---" if table.words else "|---:"
+    lines.insert(1, "|---" + rule * (len(table.header) - 1) + "|")
     head = [f"### {table.title}", ""] + ([f"**{mark}**", ""] if mark else [])
     return "\n".join([*head, *lines, *(["", table.note] if table.note else []), ""])
 

@@ -15,9 +15,11 @@ from analysis.bradley_terry import (
     describe_graph,
     fit_scale,
     quasi_variances,
-    two_way_covariance,
+    two_way_covariances,
     with_half_answers,
-)  # fmt: skip
+)
+from analysis.cells import Cells
+from analysis.clustered import clustered_rate
 
 
 @pytest.fixture(scope="module")
@@ -157,5 +159,19 @@ def test_clusters_of_one_answer_give_nearly_the_independent_covariance() -> None
     assert scale.ability == pytest.approx(truth, abs=0.2)
     alone = clustered_covariance(duels, scale, np.arange(4000))
     assert np.diag(alone)[1:] == pytest.approx(np.diag(scale.covariance)[1:], rel=0.1)
-    both = two_way_covariance(duels, scale, np.arange(4000), np.arange(4000))
-    np.testing.assert_allclose(both, alone, atol=1e-12)
+    for covariance in two_way_covariances(duels, scale, np.arange(4000), np.arange(4000)):
+        np.testing.assert_allclose(covariance, alone, atol=1e-12)
+
+
+def test_a_pair_has_the_same_error_on_the_scale_as_in_the_preference_table() -> None:
+    """Stimuli and participants whose two-way sum falls below its parts included."""
+    rng = np.random.default_rng(8)
+    people, stimuli = (part.ravel() for part in np.indices((16, 4)))
+    for _ in range(20):
+        wins = rng.binomial(4, 0.45, 64)
+        duels = Duels(np.zeros(64, int), np.ones(64, int), wins, np.full(64, 4))
+        scale = fit_scale(duels, 2)
+        se = centred(scale, *two_way_covariances(duels, scale, people, stimuli))[1]
+        rate = clustered_rate(Cells(people, stimuli, wins, np.full(64, 4)))
+        assert rate.se_logit is not None
+        assert 2 * se == pytest.approx([rate.se_logit] * 2, rel=1e-9)

@@ -112,6 +112,9 @@ def test_sentences_keep_their_place_and_split_rows() -> None:
         ("schema_version = 1", "comparison: got 'none'"),
         ("schema_version = 1\nmethod = 3", "key: got 'method'"),
         ("schema_version = 1\n[comparison.A]\naliases = 3", "comparison.A"),
+        ("schema_version = 1\ntarget = 'A'\n[comparison.A]", "target: got 'A', wanted a list"),
+        ("schema_version = 1\nanswers = 'x'\n[comparison.A]", "answers: got 'x'"),
+        ("schema_version = 1\ncomparison = 3", "comparison: got 3"),
         ("=", "content: got"),
     ],
 )
@@ -133,3 +136,21 @@ def test_the_command_exits_with_one_on_a_mismatch_only(tmp_path: Path, make_row:
     )
     bad = CliRunner().invoke(command, [str(text), "--json"])
     assert bad.exit_code == 1 and '"mismatches": 1' in bad.output
+
+
+def test_a_number_speaks_of_the_name_in_its_own_clause(tmp_path: Path) -> None:
+    """Numbers in brackets behind a name, and contrasts within a sentence."""
+    names = tmp_path / "claims.toml"
+    names.write_text("schema_version = 1\nanswers = 450\n[comparison.Beta]\n[comparison.Gamma]\n")
+    text = (
+        "The preference over Gamma (52.0 %) is small, whereas Beta lost (36.7 % preferred Beta).\n\n"
+        "It wins 63.3 % against Beta (285/450) and 52.0 % against Gamma.\n"
+    )
+    found = check_claims(text, read_claim_names(names), latex=False)
+    assert [(claim.shown, claim.comparison) for claim in found if claim.line == 1] == [
+        ("52.0", "Gamma"), ("36.7", "Beta"),
+    ]  # fmt: skip
+    assert {(c.shown, c.comparison) for c in found if c.line == 3} == {
+        ("63.3", "Beta"), ("52.0", "Gamma"), ("285 of 450", "Beta"),
+    }  # fmt: skip
+    assert {claim.verdict for claim in found if claim.kind == "percentage"} == {"OK"}

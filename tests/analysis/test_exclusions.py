@@ -177,3 +177,46 @@ def test_every_rule_is_named_once_with_prose_and_sane_bounds() -> None:
     for rule in RULES:
         assert rule.prose.endswith(".") and rule.low <= rule.default <= rule.high
         assert parse_rules("x", {rule.name: rule.default}) == {rule.name: float(rule.default)}
+
+
+@pytest.mark.parametrize(
+    ("changed", "began", "origin"),
+    [
+        ("2026-03-01T10:00:00Z", "2026-03-01T10:00:00.5Z", "declared"),
+        ("2026-03-01T01:30:00+01:00", "2026-03-01T00:00:00Z", "post hoc"),
+        ("2026-03-01T00:30:00+01:00", "2026-03-01T00:00:00Z", "declared"),
+        ("2026-03-01T00:30:00Z", None, "declared"),
+    ],
+)
+def test_rules_are_post_hoc_when_they_changed_after_the_first_moment_of_collection(
+    changed: str,
+    began: str | None,
+    origin: str,
+    tmp_path: Path,
+    make_answers: Callable,
+    make_row: Callable,
+) -> None:
+    path = make_answers(
+        tmp_path / "r.csv", [make_row()], exclusions={"drop_late": True},
+        exclusions_changed_at=changed, collection_began_at=began,
+    )  # fmt: skip
+    assert read_codebook(path).rules_origin == origin
+
+
+def test_a_misspelt_rule_table_is_said_loudly(
+    tmp_path: Path, make_answers: Callable, make_row: Callable
+) -> None:
+    path = make_answers(tmp_path / "r.csv", [make_row()], exclusion={"drop_late": True})
+    assert read_codebook(path).unknown_fields == ("exclusion",)
+    warnings = estimate(path, bootstraps=100)["warnings"]
+    assert "codebook.json holds fields that are not known and were not used: exclusion." in warnings
+
+
+def test_two_modes_without_live_answers_want_a_choice(
+    tmp_path: Path, make_answers: Callable, make_row: Callable
+) -> None:
+    rows = [make_row(participant=mode, mode=mode) for mode in ("pilot", "simulated")]
+    responses = read_responses(make_answers(tmp_path / "r.csv", rows))
+    with pytest.raises(InputError, match=r"got 'pilot, simulated', wanted one of them.*--mode"):
+        select_mode(responses, None)
+    assert select_mode(responses, "pilot")[1:] == ("pilot", {"simulated": 1})

@@ -24,6 +24,7 @@ from analysis.estimate import estimate
 from analysis.prose import markdown_report
 from analysis.report import html_report
 from analysis.results import read_results
+from renderer.catalogue import Catalogue, write_catalogue
 from renderer.files import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -176,10 +177,14 @@ def test_every_number_of_the_latex_table_is_a_macro_that_exists(final: Path) -> 
 
 
 def test_macro_names_hold_letters_only_and_never_clash() -> None:
-    stems = latex.macro_stems(["pace+", "pace", "PACE", "m2", "m-two", "…", "a_b", "a b"])
+    many = [f"方{'法' * count}" for count in range(40)]
+    stems = latex.macro_stems(
+        ["pace+", "pace", "PACE", "m2", "m-two", "…", "a_b", "a b", "study", *many]
+    )
     assert all(re.fullmatch("[A-Za-z]+", stem) for stem in stems.values())
     assert len(set(stems.values())) == len(stems)
     assert stems["pace+"] == "PacePlus" and stems["m2"] == "MTwo"
+    assert stems["study"] != "Study"  # the macros of the flow begin so
 
 
 def test_a_formula_in_a_name_is_defused_in_csv(
@@ -284,3 +289,62 @@ def test_results_of_another_schema_are_refused(tmp_path: Path) -> None:
     (tmp_path / "results.json").write_text('{"schema_version": 99}')
     with pytest.raises(InputError, match="schema_version: got 99"):
         read_results(tmp_path / "results.json")
+
+
+def _catalogue(folder: Path, methods: dict[str, str]) -> Path:
+    described = tuple({"name": name, "display_name": shown} for name, shown in methods.items())
+    folder.mkdir(exist_ok=True)
+    write_catalogue(Catalogue("set", "2026-01-01", {}, (), (), described, (), ()), folder)
+    return folder
+
+
+def test_display_names_are_read_but_nothing_is_computed_from_them(
+    tmp_path: Path, make_study: Callable, make_answers: Callable
+) -> None:
+    path = make_answers(tmp_path / "r.csv", make_study({"PAAK": 60, "POSA-T": 70}, participants=6))
+    names = {"PACE": "Ours [full]", "PAAK": "PAAK (2023)", "unused": "Other"}
+    plain = estimate(path, bootstraps=100)
+    named = estimate(path, bootstraps=100, catalogue=_catalogue(tmp_path / "a", names))
+    assert named["names"] == {"PACE": "Ours [full]", "PAAK": "PAAK (2023)"} and plain["names"] == {}
+    assert {k: v for k, v in named.items() if k not in ("names", "metrics", "warnings")} == {
+        k: v for k, v in plain.items() if k not in ("names", "metrics", "warnings")
+    }
+    page = markdown_report(named)
+    assert "Against POSA-T, Ours [full] (PACE) was chosen" in page
+    assert "| PAAK (2023) | " in page and "{}PAAK (2023) & " in latex.preference_tex(named)
+    assert "\nPAAK," in tables.all_csv(named)["preference"]
+
+
+def test_a_display_name_of_two_methods_is_not_used(
+    tmp_path: Path, make_study: Callable, make_answers: Callable
+) -> None:
+    path = make_answers(tmp_path / "r.csv", make_study({"PAAK": 60, "POSA-T": 70}, participants=6))
+    for names in ({"PAAK": "Rival", "POSA-T": "Rival"}, {"PAAK": "POSA-T"}):
+        results = estimate(path, bootstraps=100, catalogue=_catalogue(tmp_path / "set", names))
+        assert results["names"] == {}
+
+
+def test_the_terminal_shows_the_sum_of_all_rows_and_the_loud_lines(
+    tmp_path: Path, make_study: Callable, make_answers: Callable, make_row: Callable
+) -> None:
+    rows = make_study({"PAAK": 60, "POSA-T": 70}, participants=6)
+    rows += [make_row(participant=f"P{p:02d}", trial_index=99, trial_kind="catch", expected_method="PACE")
+             for p in range(6)]  # fmt: skip
+    rows[0]["late"] = "true"
+    path = make_answers(tmp_path / "r.csv", rows, exclusions={"drop_late": True})
+    results = estimate(path, bootstraps=100)
+    shown = " ".join(tables.terminal_table(results).split())
+    total = "239 answers of 6 participants analysed + 6 catch + 1 excluded by drop_late"
+    assert f"246 rows = {total}." in shown
+    assert results["warnings"] and all(f"! {line}" in shown for line in results["warnings"])
+
+
+def test_the_methods_say_only_what_was_done(
+    tmp_path: Path, make_study: Callable, make_answers: Callable
+) -> None:
+    path = make_answers(tmp_path / "r.csv", make_study({"PAAK": 60}, participants=6), exclusions={})
+    page = markdown_report(estimate(path, bootstraps=100))
+    assert "between PACE and PAAK." in page and "each of" not in page
+    assert "adjusted by Holm's method" not in page and "their differences" not in page
+    assert "The study design declares no rules; nothing was excluded." in page
+    assert not re.search(r"(?<![−\d.])(\d[\d.]*) to \1\b", page)

@@ -61,7 +61,8 @@ def test_power_grows_with_participants_and_a_pool_narrows_the_interval() -> None
     ("changes", "field"),
     [
         ({"rates": (1.2,)}, "rate"), ({"pool": 3}, "pool"), ({"dropout": 1.0}, "dropout"),
-        ({"participants": 1}, "participants"),
+        ({"participants": 1}, "participants"), ({"sd_stimulus": float("nan")}, "sd_stimulus"),
+        ({"sd_participant": float("inf")}, "sd_participant"),
     ],
 )  # fmt: skip
 def test_an_impossible_plan_names_its_field(changes: dict, field: str) -> None:

@@ -93,10 +93,13 @@ def test_a_broken_last_line_is_named(
     with pytest.raises(InputError, match="row 9, answered_at"):
         read_responses(path)
     path.write_text(whole.replace("\r\n", "\n").rstrip("\n") + ",more\n")
-    with pytest.raises(InputError, match=r"line 9, saw 29|too many cells"):
+    with pytest.raises(InputError, match="row 9: got '29 cells', wanted 28"):
         read_responses(path)
     path.write_text(whole + 'study,"v1')
-    with pytest.raises(InputError, match="28 cells a row"):
+    with pytest.raises(InputError, match=r"row 10: .*quotes closed"):
+        read_responses(path)
+    path.write_bytes(whole.replace("\r\n", "\n").encode() + "sé".encode("latin-1"))
+    with pytest.raises(InputError, match="row 10: got 'byte 0xe9', wanted 28 cells in UTF-8"):
         read_responses(path)
 
 

@@ -170,7 +170,7 @@ def test_a_metric_that_decides_every_answer_predicts_all_and_a_constant_one_is_r
     delta = rng.normal(size=20)
     delta[3] = 0.0
     won = delta[item] > 0
-    linked = Linked(won, people, item, np.zeros(300, int), {
+    linked = Linked(won, people, item, item, np.zeros(300, int), {
         "decides": delta, "constant": np.full(20, 0.2), "noise": rng.normal(size=20),
         "absent": np.full(20, np.nan),
     })  # fmt: skip
@@ -178,7 +178,7 @@ def test_a_metric_that_decides_every_answer_predicts_all_and_a_constant_one_is_r
     assert found["decides"]["predicted"] == 1.0 and found["decides"]["ties"] == 15
     assert found["decides"]["slope_per_sd"] is None  # separated: no finite slope
     assert (
-        "same for all stimuli" in found["constant"]["why"]
+        "same for all pairs" in found["constant"]["why"]
         and found["constant"]["slope_per_sd"] is None
     )
     assert "fewer than 3" in found["absent"]["why"]
@@ -211,3 +211,24 @@ def test_scores_are_joined_by_method_scene_and_motion(
     assert metrics["set_id"] == "set" and metrics["metrics"]["contact"]["items"] == 20
     assert metrics["metrics"]["contact"]["max"] == pytest.approx(0.34)
     assert metrics["metrics"]["contact"]["slope_per_sd"] is not None
+
+
+def test_metrics_cluster_by_scene_and_motion_and_refuse_what_cannot_be_measured() -> None:
+    """Two comparisons share their 6 clips; rounding is no difference; one kind of answer says nothing."""
+    rng = np.random.default_rng(2)
+    item = np.tile(np.arange(12), 10)
+    people = np.repeat(np.arange(10), 12)
+    delta = rng.normal(size=12)
+    won = rng.random(120) < 0.5
+    linked = Linked(won, people, item, item % 6, item // 6, {
+        "score": delta, "rounding": 1e-12 * delta,
+    })  # fmt: skip
+    found = link_metrics(linked, 0.95, split_ceiling(linked))["metrics"]
+    assert found["score"]["clusters"] == 6
+    wanted = clustered_slope(delta[item] / delta.std(), won, item // 6, (people, item % 6))
+    assert wanted is not None and found["score"]["slope_per_sd"] == pytest.approx(wanted[0])
+    half = stats.t.ppf(0.975, 5) * wanted[1]
+    assert found["score"]["ci"] == pytest.approx([wanted[0] - half, wanted[0] + half])
+    assert "same for all pairs" in found["rounding"]["why"]
+    always = link_metrics(replace(linked, won=np.ones(120, bool)), 0.95, {})["metrics"]
+    assert always["score"]["why"] == "all answers are the same"
