@@ -31,7 +31,7 @@ from study_app.tokens import new_token
 def lock_participant(session: Session, participant_id: int) -> Participant:
     """The participant, with every other request of this person held off until we are done."""
     participant = session.scalar(
-        select(Participant).where(Participant.id == participant_id).with_for_update()
+        select(Participant).where(Participant.id == participant_id).with_for_update(of=Participant)
     )
     assert participant is not None
     return participant

@@ -167,8 +167,12 @@ class Pair(Base):
     baseline_clip_id: Mapped[int] = mapped_column(ForeignKey("clip.id"))
     expected_method: Mapped[str | None] = mapped_column(String(64))
 
-    target_clip: Mapped[ClipRow] = relationship(foreign_keys=[target_clip_id])
-    baseline_clip: Mapped[ClipRow] = relationship(foreign_keys=[baseline_clip_id])
+    target_clip: Mapped[ClipRow] = relationship(
+        foreign_keys=[target_clip_id], lazy="joined", innerjoin=True
+    )
+    baseline_clip: Mapped[ClipRow] = relationship(
+        foreign_keys=[baseline_clip_id], lazy="joined", innerjoin=True
+    )
 
     @property
     def stimulus(self) -> str:
@@ -237,7 +241,7 @@ class Participant(Base):
     excluded: Mapped[bool] = mapped_column(default=False)
     """Excluded by the experimenter: the answers stay, the pairs are topped up by others."""
 
-    version: Mapped[StudyVersion] = relationship()
+    version: Mapped[StudyVersion] = relationship(lazy="joined", innerjoin=True)
     trials: Mapped[list[Trial]] = relationship(
         order_by="Trial.ordinal", back_populates="participant", cascade="all, delete-orphan"
     )

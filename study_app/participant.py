@@ -24,7 +24,7 @@ from study_app import services
 from study_app.config import StudyConfig
 from study_app.context import forget, installation, recall, remember
 from study_app.models import Participant, StudyVersion
-from study_app.progress import progress_of
+from study_app.progress import due_page, progress_of
 from study_app.services import Refused
 from study_app.studies import find_study, study_config
 from study_app.texts import study_texts
@@ -140,9 +140,10 @@ def session_page(study_id: str) -> ResponseReturnValue:
             return redirect(url_for(".landing", study_id=study_id), 303)
         if person.version.state == "closed" and person.state != "finished":
             raise Refused("closed")
-        page, person_id = progress_of(person).page, person.id
+        page, person_id = due_page(db, person), person.id
     if page in ("trial", "done"):
-        return _trial_page(study_id) if page == "trial" else _done_page(study_id, person_id)
+        show = _trial_page if page == "trial" else _done_page
+        return show(study_id, person_id)
     with here.database.read() as db:
         return _step_page(services.find_participant(db, token, study_id), page)
 
@@ -159,9 +160,8 @@ def _step_page(person: Participant, page: str) -> str:
     )
 
 
-def _trial_page(study_id: str) -> ResponseReturnValue:
+def _trial_page(study_id: str, person_id: int) -> ResponseReturnValue:
     here = installation()
-    person_id = _person_id(study_id)
     began = time.perf_counter()
     services.bind_window(here.database, person_id, here.now(), here.settings.window, here.lease)
     bound_ms = 1000 * (time.perf_counter() - began)

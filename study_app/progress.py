@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from study_app.allocation import seats_ahead
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
 from study_app.models import Participant, Trial
 from study_app.studies import study_config
 
@@ -26,7 +28,9 @@ def progress_of(participant: Participant) -> Progress:
     real = [trial for trial in participant.trials if trial.kind != "practice"]
     practice = [trial for trial in participant.trials if trial.kind == "practice"]
     done, practised = _done(real), _done(practice)
-    page = _due_page(participant)
+    page = _step_due(participant) or (
+        "trial" if done + practised < len(real + practice) else "done"
+    )
     return Progress(page, done, len(real), practised, len(practice))
 
 
@@ -34,7 +38,16 @@ def _done(trials: list[Trial]) -> int:
     return sum(trial.state in ("answered", "void") for trial in trials)
 
 
-def _due_page(participant: Participant) -> str:
+def due_page(session: Session, participant: Participant) -> str:
+    """The page that is due, without loading the session's trials."""
+    ahead = select(Trial.id).where(
+        Trial.participant_id == participant.id, Trial.state.not_in(("answered", "void"))
+    )
+    due = _step_due(participant)
+    return due or ("trial" if session.scalar(ahead.limit(1)) is not None else "done")
+
+
+def _step_due(participant: Participant) -> str | None:
     checks = study_config(participant.version).checks
     before = [
         ("instructions", True),
@@ -44,4 +57,4 @@ def _due_page(participant: Participant) -> str:
     for name, wanted in before:
         if wanted and name not in participant.steps:
             return name
-    return "trial" if seats_ahead(participant) else "done"
+    return None

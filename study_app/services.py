@@ -13,6 +13,7 @@ from typing import Any
 
 from sqlalchemy import delete, select, update
 from sqlalchemy.orm import Session
+from sqlalchemy.orm.attributes import set_committed_value
 
 from study_app import design
 from study_app.allocation import bind_next, count, lock_participant, renew_leases, seats_ahead
@@ -196,6 +197,7 @@ def show_trial(
     if not ahead:
         return None
     trial = ahead[0]
+    set_committed_value(trial, "participant", participant)  # the session itself would let go of it
     trial.shown_at = trial.shown_at or now
     if trial.state == "leased":
         trial.state = "shown"
