@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from analysis.display import fixed, holding, p_value, percent, percent_interval, span
@@ -66,7 +67,8 @@ def markdown_report(results: Results) -> str:
     ]
     tables = [markdown(table, mark) for table in all_tables(results)]
     questions = [f"- **{question}** {answer}" for question, answer in checklist(results)]
-    return "\n".join([*head, *tables, "## A reviewer's questions", "", *questions, ""])
+    page = "\n".join([*head, *tables, "## A reviewer's questions", "", *questions, ""])
+    return re.sub(r"<(?=[A-Za-z/!?])", "&lt;", page)  # names are text, never markup
 
 
 def results_paragraph(results: Results) -> str:

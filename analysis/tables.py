@@ -7,6 +7,7 @@ import html
 import io
 import textwrap
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 from analysis.display import holding
@@ -57,6 +58,11 @@ def preference_note(results: Results) -> str:
         "* Wilson; assumes independent answers.",
         _conservation(flow),
     ]
+    shown = [row["display"] for _, row in ordered(results)]
+    if any(Fraction(row["rate"]) + Fraction(row["baseline_rate"]) != 100 for row in shown):
+        notes.append(
+            "Shares are rounded half-up one by one; a share of exactly x.x5 makes two add to 100.1."
+        )
     notes += [
         f"{comparison_label(results, name)}: {flag}."
         for name, row in ordered(results)
@@ -70,7 +76,9 @@ def _conservation(flow: dict[str, Any]) -> str:
     people = holding(flow["analysed_participants"], "participant")
     gone = [f"{count:,} mode {mode}" for mode, count in flow["other_mode"].items()]
     gone += [f"{count:,} {kind}" for kind, count in flow["other_kind"].items()]
-    gone += [f"{count:,} excluded by {rule}" for rule, count in flow["excluded_answers"].items()]
+    gone += [
+        f"{count:,} excluded by {rule}" for rule, count in flow["excluded_answers"].items() if count
+    ]
     total = " + ".join([f"{flow['analysed']:,} answers of {people} analysed", *gone])
     return f"{holding(flow['rows'], 'row')} = {total}."
 

@@ -348,3 +348,27 @@ def test_the_methods_say_only_what_was_done(
     assert "adjusted by Holm's method" not in page and "their differences" not in page
     assert "The study design declares no rules; nothing was excluded." in page
     assert not re.search(r"(?<![−\d.])(\d[\d.]*) to \1\b", page)
+
+
+@pytest.mark.parametrize(("wins", "shares"), [(9, ("56.3", "43.8")), (8, ("50.0", "50.0"))])
+def test_two_halves_that_are_both_rounded_up_are_explained(
+    wins: int, shares: tuple[str, str], tmp_path: Path, make_study: Callable, make_answers: Callable
+) -> None:
+    rows = make_study({"PAAK": wins}, participants=4, scenes=2, clips=2)
+    table = tables.preference_table(
+        estimate(make_answers(tmp_path / "r.csv", rows), bootstraps=100)
+    )
+    assert table.rows[0][3:1:-1] == shares
+    assert ("two add to 100.1" in table.note) == (wins == 9)
+
+
+def test_markup_in_a_name_stays_text_in_markdown_and_html(
+    tmp_path: Path, make_answers: Callable, make_row: Callable
+) -> None:
+    rows = [make_row(participant=f"P{p}", trial_index=i, motion=f"m{i}", scene="<b onclick=x>",
+                     baseline="<script>alert(1)</script>", won=p % 2 == i % 2)
+            for p in range(4) for i in (1, 2, 3)]  # fmt: skip
+    results = estimate(make_answers(tmp_path / "r.csv", rows), bootstraps=100)
+    for page in (markdown_report(results), html_report(results, {})):
+        assert "<script" not in page and "<b " not in page
+        assert "&lt;script" in page and "&lt;b onclick" in page
