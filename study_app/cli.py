@@ -42,7 +42,7 @@ def create(study_toml: Path, catalogue: Path, url: str | None, as_json: bool) ->
     from study_app.config import read_study
     from study_app.db import upgrade
     from study_app.lists import read_lists
-    from study_app.stimuli import plan_study
+    from study_app.stimuli import plan_study, shortages
     from study_app.studies import create_study
 
     config = read_study(study_toml)
@@ -58,8 +58,11 @@ def create(study_toml: Path, catalogue: Path, url: str | None, as_json: bool) ->
             "version": version.version,
             "pairs": sum(pair.kind == "main" for pair in plan.pairs),
             "cells": len(plan.cells),
+            "notes": shortages(plan),
         }
 
+    for note in shortages(plan):
+        click.echo(f"note: {note}", err=True)
     _show(
         database.retry(work),
         as_json,

@@ -67,6 +67,19 @@ def plan_study(config: StudyConfig, folder: Path, source: object) -> StudyPlan:
     return StudyPlan(config, folder, file_sha256(folder / FILE_NAME), cells, tuple(pairs))
 
 
+def shortages(plan: StudyPlan) -> list[str]:
+    """One line for each kind of extra trials that must show a pair again within one session."""
+    lines = []
+    for kind in ("catch", "practice", "identical"):
+        asked = getattr(plan.config.extra_trials, kind)
+        pairs = sum(pair.kind == kind for pair in plan.pairs)
+        if asked > pairs:
+            lines.append(
+                f"{asked} {kind} trials a person from {pairs} {kind} pairs: some are shown again"
+            )
+    return lines
+
+
 def _check_names(config: StudyConfig, catalogue: Catalogue, source: object) -> None:
     methods = sorted({clip.method for clip in catalogue.main_clips()})
     scenes = sorted({clip.scene for clip in catalogue.main_clips()})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import uuid
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -231,3 +232,17 @@ def test_no_seat_of_a_session_shows_a_scene_and_motion_twice(
     with site.database.read() as session:
         keys = session.scalars(select(Trial.exposure_key)).all()
     assert len(keys) == 12 == len(set(keys))
+
+
+@pytest.mark.parametrize(("asked", "views"), [(2, [1, 1]), (3, [1, 2])])
+def test_catch_and_practice_pairs_repeat_only_when_none_is_left(
+    new_site: NewSite, sqlite_url: str, asked: int, views: list[int]
+) -> None:
+    site = new_site(sqlite_url, f"[extra_trials]\ncatch = {asked}\npractice = {asked}")
+    for _ in range(3):
+        assert site.visitor().answer_all().finished
+    with site.database.read() as session:
+        for person in session.scalars(select(Participant)):
+            for kind in ("catch", "practice"):
+                met = Counter(one.pair_id for one in person.trials if one.kind == kind)
+                assert sorted(met.values()) == views

@@ -132,3 +132,16 @@ def test_a_simulation_without_a_server_or_with_a_wrong_ticket_says_so(
     assert reply.returncode == 1 and "wanted a running study server" in reply.stderr
     reply = pace("simulate", "--url", serve(created), "--ticket", "x" * 20)
     assert reply.returncode == 1 and "got 404" in reply.stderr
+
+
+def test_too_few_extra_pairs_are_told_when_the_study_is_created(
+    pace: Pace, study_file: Callable[..., Path], still_stimuli: Path, sqlite_url: str
+) -> None:
+    study = study_file("[extra_trials]\ncatch = 3\npractice = 2\nidentical = 13")
+    where = ("--catalogue", still_stimuli, "--database", sqlite_url, "--json")
+    made = pace("study", "create", study, *where)
+    assert json.loads(made.stdout)["notes"] == [
+        "3 catch trials a person from 2 catch pairs: some are shown again",
+        "13 identical trials a person from 12 identical pairs: some are shown again",
+    ]
+    assert made.stderr.count("note: ") == 2
