@@ -1,5 +1,8 @@
 // The page's modules as node can load them, and stand-ins for the parts of a browser that they touch.
+import { webcrypto } from "node:crypto";
 import { readFileSync } from "node:fs";
+
+globalThis.crypto ??= webcrypto; // node 18
 
 /** Import a module of the page by its source: its folder need not say that it holds modules. */
 export function load(name) {

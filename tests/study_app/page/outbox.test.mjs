@@ -1,15 +1,18 @@
 import assert from "node:assert/strict";
-import test, { beforeEach, mock } from "node:test";
+import test, { beforeEach } from "node:test";
 
 import { browser, load } from "./load.mjs";
 
 const { kept } = browser();
 const { Outbox, uuid } = await load("outbox.js");
-mock.timers.enable({ apis: ["setTimeout"] });
+let clock = 0;
+let timers = [];
+globalThis.setTimeout = (work, milliseconds) => timers.push({ work, at: clock + milliseconds });
 
 let sent, replies, told, box;
 beforeEach(() => {
   kept.clear();
+  timers = [];
   [sent, replies, told] = [[], [], []];
   globalThis.location = { reload: () => told.push("reload") };
   globalThis.fetch = async (url, request) => {
@@ -29,7 +32,10 @@ beforeEach(() => {
 async function pass(milliseconds = 0) {
   for (let i = 0; i < 20; i += 1) await Promise.resolve();
   for (let left = milliseconds; left > 0; left -= 50) {
-    mock.timers.tick(50);
+    clock += 50;
+    const due = timers.filter((timer) => timer.at <= clock);
+    timers = timers.filter((timer) => timer.at > clock);
+    for (const timer of due) timer.work();
     for (let i = 0; i < 20; i += 1) await Promise.resolve();
   }
 }
