@@ -218,8 +218,14 @@ def scale(results: Results) -> Figure:
 
 
 def _label(name: str, detail: str) -> str:
-    """A name on at most two lines, and a detail in brackets below it."""
-    lines = textwrap.wrap(name, 26, max_lines=2, placeholder=" …") or [name]
+    """A name on at most two lines, both sides of a pair on their own, and a detail in brackets below."""
+    sides = name.split(" vs ")
+    if len(name) > 26 and len(sides) == 2:
+        lines = [
+            textwrap.shorten(side, 26, placeholder=" …") for side in (sides[0], f"vs {sides[1]}")
+        ]
+    else:
+        lines = textwrap.wrap(name, 26, max_lines=2, placeholder=" …") or [name]
     if len(lines) == 1 and len(name) + len(detail) < 26:
         return f"{name}  ({detail})"
     return "\n".join([*lines, f"({detail})"])

@@ -16,8 +16,7 @@ def methods_paragraph(results: Results) -> str:
     sentences = [
         f"{holding(flow['analysed_participants'], 'participant')} gave "
         f"{holding(flow['analysed'], 'answer')} in a "
-        f"two-alternative forced choice between {_methods(results, results['targets'])} and "
-        f"{'each of ' if len(_baselines(results)) > 1 else ''}{_methods(results, _baselines(results))}.",
+        f"two-alternative forced choice between {_shown_pairs(results)}.",
         _exclusion_sentence(results),
         "For each comparison we report the share of answers in favour of the target with a "
         f"{level} confidence interval "
@@ -136,6 +135,15 @@ def _baselines(results: Results) -> list[str]:
 
 def _methods(results: Results, methods: list[str]) -> str:
     return _list([method_label(results, method) for method in methods])
+
+
+def _shown_pairs(results: Results) -> str:
+    targets, baselines = results["targets"], _baselines(results)
+    if len(targets) > 1:
+        pairs, methods = len(results["order"]), sorted({*targets, *baselines})
+        return f"{pairs} pairs of {_methods(results, methods)}"
+    each = "each of " if len(baselines) > 1 else ""
+    return f"{_methods(results, targets)} and {each}{_methods(results, baselines)}"
 
 
 def _mention(results: Results, method: str, named: set[str]) -> str:

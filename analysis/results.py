@@ -48,7 +48,9 @@ def comparison_label(results: Results, name: str, with_id: bool = False) -> str:
 
 
 def target_labels(results: Results) -> str:
-    """The methods under study, for titles and axes."""
+    """The method under study, for titles and axes; of several, each row names its own first."""
+    if len(results["targets"]) > 1:
+        return "the first-named method"
     return ", ".join(method_label(results, target) for target in results["targets"])
 
 

@@ -372,3 +372,23 @@ def test_markup_in_a_name_stays_text_in_markdown_and_html(
     for page in (markdown_report(results), html_report(results, {})):
         assert "<script" not in page and "<b " not in page
         assert "&lt;script" in page and "&lt;b onclick" in page
+
+
+def test_several_targets_are_named_row_by_row(
+    tmp_path: Path, make_answers: Callable, make_row: Callable
+) -> None:
+    rows = [make_row(participant=f"P{p}", trial_index=i, motion=f"m{i}", won=(p + i) % 3 > 0,
+                     target=("A", "B", "C")[i % 3], baseline=("B", "C", "A")[i % 3])
+            for p in range(4) for i in range(1, 10)]  # fmt: skip
+    results = estimate(make_answers(tmp_path / "r.csv", rows), bootstraps=100)
+    assert sorted(results["order"]) == ["A vs B", "B vs C", "C vs A"]
+    page = markdown_report(results)
+    assert "forced choice between 3 pairs of A, B and C." in page
+    assert "Target: the first-named method." in page
+    assert r"\caption{\textbf{NOT FROZEN} Preference for the first-named method." in (
+        latex.preference_tex(results)
+    )
+    long = "a method with a name that is long"
+    assert (
+        figures._label(f"{long} vs other", "n = 9") == "a method with a name …\nvs other\n(n = 9)"
+    )
