@@ -101,11 +101,24 @@ class Study:
 
 
 @pytest.fixture
-def study(tmp_path: Path, playing_stimuli: Path) -> Iterator[Study]:
-    running = Study(tmp_path, playing_stimuli)
-    yield running
-    assert json.loads(pace("study", "doctor", "tiny", "--json", *running.where))["findings"] == []
-    running.stop()
+def new_study(tmp_path: Path, playing_stimuli: Path) -> Iterator[Callable[..., Study]]:
+    """Starts a study with other checks or settings; at the end its counters must be right."""
+    running: list[Study] = []
+
+    def start(*words: Any, **settings: Any) -> Study:
+        running.append(Study(tmp_path, playing_stimuli, *words, **settings))
+        return running[-1]
+
+    yield start
+    for one in running:
+        one.stop()
+        told = json.loads(pace("study", "doctor", "tiny", "--json", *one.where))
+        assert told["findings"] == []
+
+
+@pytest.fixture
+def study(new_study: Callable[..., Study]) -> Study:
+    return new_study()
 
 
 @pytest.fixture
@@ -304,9 +317,9 @@ class Inspector:
 
 
 def test_every_page_on_the_way_is_accessible_in_both_themes_on_a_narrow_phone(
-    tmp_path: Path, playing_stimuli: Path, visit: Callable[..., Page]
+    tmp_path: Path, new_study: Callable[..., Study], visit: Callable[..., Page]
 ) -> None:
-    study = Study(tmp_path, playing_stimuli, "comprehension = true\ndemographics = true\n")
+    study = new_study("comprehension = true\ndemographics = true\n")
     page = visit(study.url, viewport={"width": 320, "height": 640})
     check = Inspector(page, tmp_path)
     check("consent")
@@ -341,15 +354,13 @@ def test_every_page_on_the_way_is_accessible_in_both_themes_on_a_narrow_phone(
     check("withdraw")
     page.get_by_test_id("withdraw-confirm").click()
     check("withdrawn")
-    study.stop()
     assert len(check.checked) == 13
 
 
 def test_every_page_of_trouble_is_accessible_in_both_themes_and_helps(
-    tmp_path: Path, playing_stimuli: Path, visit: Callable[..., Page]
+    tmp_path: Path, new_study: Callable[..., Study], visit: Callable[..., Page]
 ) -> None:
-    limit = {"PACE_REQUESTS_PER_MINUTE": "100"}
-    study = Study(tmp_path, playing_stimuli, opened=False, **limit)
+    study = new_study(opened=False, PACE_REQUESTS_PER_MINUTE="100")
     page = visit(study.url, viewport={"width": 320, "height": 640})
     check = Inspector(page, tmp_path)
 
@@ -375,7 +386,6 @@ def test_every_page_of_trouble_is_accessible_in_both_themes_and_helps(
     page.get_by_test_id("begin").or_(page.get_by_text("Back to the study")).click()
     pace("study", "close", "tiny", *study.where)
     meet("closed", "/session", 409, "no longer takes answers")
-    study.stop()
     assert len(check.checked) == 6
 
 
@@ -428,6 +438,30 @@ HIDE = """(hidden) => {
   Object.defineProperty(document, 'hidden', { configurable: true, get: () => hidden });
   document.dispatchEvent(new Event('visibilitychange'));
 }"""
+
+
+def test_a_slow_line_is_told_and_too_slow_a_one_is_turned_away_with_the_reason(
+    new_study: Callable[..., Study], visit: Callable[..., Page]
+) -> None:
+    study = new_study("min_kbit_s = 1000\n")
+    page = visit(study.url)
+    devtools = page.context.new_cdp_session(page)
+    slow = {"offline": False, "latency": 50, "uploadThroughput": -1, "downloadThroughput": 40_000}
+    devtools.send("Network.enable")
+    devtools.send("Network.emulateNetworkConditions", slow)
+    page.get_by_test_id("consent-agree").click()
+    expect(page.locator("#screen-message")).to_contain_text("takes a few seconds")
+    expect(page.locator("#screen-message")).to_contain_text("needs about 1000", timeout=15_000)
+    expect(page.get_by_test_id("begin")).to_be_disabled()
+    devtools.send("Network.emulateNetworkConditions", slow | {"downloadThroughput": -1})
+    page.reload()
+    page.get_by_test_id("begin").click()
+    trial = trial_of(page)
+    page.route("**/m/*", lambda route: None)
+    page.reload()
+    assert trial_of(page) == trial
+    expect(page.locator("#status")).to_contain_text("slow at the moment", timeout=10_000)
+    page.unroute_all(behavior="ignoreErrors")
 
 
 def test_the_back_button_leads_to_the_trial_that_is_due(
