@@ -129,14 +129,21 @@ def _judge_interval(claim: Claim, row: dict[str, Any]) -> Claim:
 
 def _judge_p(claim: Claim, row: dict[str, Any]) -> Claim:
     _, sign, text = claim.shown.split()
-    value, digits = float(text), len(text.partition(".")[2])
+    value = float(text)
     for key in ("p_holm", "p", "p_exact"):
         p = row[key]
-        same = round_half_up(Fraction(p), digits).lstrip("0") == text.lstrip("0")
-        holds = {"<": p < value, "≤": p <= value, ">": p > value, "=": same}[sign]
+        holds = {"<": p < value, "≤": p <= value, ">": p > value, "=": _prints_as(p, text)}[sign]
         if holds:
             return replace(claim, verdict="OK", note=f"results: {key} = {p:.3g}")
     return replace(claim, verdict="MISMATCH", note=f"results: p (Holm) = {row['p_holm']:.3g}")
+
+
+def _prints_as(p: float, text: str) -> bool:
+    mantissa, exponent, _ = text.partition("e")
+    digits = len(mantissa.partition(".")[2])
+    if exponent:
+        return float(f"{p:.{digits}e}") == float(text)
+    return round_half_up(Fraction(p), digits).lstrip("0") == text.lstrip("0")
 
 
 def _judge_count(claim: Claim, names: ClaimNames, results: Results | None) -> Claim:

@@ -21,7 +21,7 @@ _NUMBER = r"(?<![\w.])(\d{1,3}(?:\.\d+)?)"
 _PERCENT = re.compile(_NUMBER + r"\s*(?:%|percent\b|per cent\b)")
 _RANGE = re.compile(r"\[?\s*(\d{1,2}\.\d+)\s*%?\s*(?:–|--|-|,|to)\s*(\d{1,3}\.\d+)\s*%?\s*\]?")
 _LEVEL = re.compile(r"\s*(?:CI\b|confidence|interval|credible|level|power)")
-_P = re.compile(r"\bp\s*(<|=|≤|>)\s*(0?\.\d+(?:e-\d+)?)")
+_P = re.compile(r"\bp\s*(<|=|≤|>)\s*(0?\.\d+|\d(?:\.\d+)?e-\d+)")
 _OF = re.compile(r"\b(\d[\d,]*)\s*(?:of|out of|/)\s*(?:the\s+)?(\d[\d,]*)\b")
 _N = re.compile(r"\b[nN]\s*=\s*(\d[\d,]*)")
 _COUNT = re.compile(
@@ -156,24 +156,39 @@ def _find(
     def claim(kind: Any, shown: str, at: int, comparison: str | None) -> Claim:
         return Claim(kind, shown, lines.at(sentence.start + at), comparison)
 
+    hosts: list[tuple[int, str]] = []
     for match in numbers:
-        ignored = any(word in _clause(text, match.start()) for word in names.ignore)
-        found = (
-            _attached(text, match.start(), marks, mentions) if preference and not ignored else None
-        )
-        one = claim("percentage", match.group(1), match.start(), found)
-        if column is not None and found is not None:
-            mine = text.count("&", 0, match.start()) == column
-            one = replace(one, share="target" if mine else "other")
+        at = match.start()
+        ignored = any(word in _clause(text, at) for word in names.ignore)
+        found = _attached(text, at, marks, mentions) if preference and not ignored else None
+        one = claim("percentage", match.group(1), at, found)
+        if found is not None:
+            hosts.append((at, found))
+            if column is not None:
+                mine = text.count("&", 0, at) == column
+                one = replace(one, share="target" if mine else "other")
         yield one
-    for match in _RANGE.finditer(text):
-        if match.span() in taken:
-            found = _attached(text, match.start(), [match.start()], mentions)
-            yield claim("interval", f"{match.group(1)}–{match.group(2)}", match.start(), found)
-    for match in _P.finditer(text):
-        found = _attached(text, match.start(), [m.start() for m in _P.finditer(text)], mentions)
-        yield claim("p", f"p {match.group(1)} {match.group(2)}", match.start(), found)
+    yield from _find_beside(text, claim, mentions, hosts)
     yield from _find_counts(text, claim, mentions)
+
+
+def _find_beside(
+    text: str, claim: Any, mentions: list[tuple[int, int, str]], hosts: list[tuple[int, str]]
+) -> Iterator[Claim]:
+    """Intervals and p values; each belongs to the share printed before it, where there is one."""
+
+    def host(match: re.Match[str], marks: list[int]) -> str | None:
+        before = [found for at, found in hosts if at < match.start()]
+        return before[-1] if before else _attached(text, match.start(), marks, mentions)
+
+    for match in _RANGE.finditer(text):
+        if _is_interval(text, match):
+            found = host(match, [match.start()])
+            yield claim("interval", f"{match.group(1)}–{match.group(2)}", match.start(), found)
+    marks = [match.start() for match in _P.finditer(text)]
+    for match in _P.finditer(text):
+        found = host(match, marks)
+        yield claim("p", f"p {match.group(1)} {match.group(2)}", match.start(), found)
 
 
 def _find_counts(text: str, claim: Any, mentions: list[tuple[int, int, str]]) -> Iterator[Claim]:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.claims import check_claims, check_text, implied_counts
-from analysis.claims_found import read_claim_names
+from analysis.claims_found import names_from_results, read_claim_names
 from analysis.claims_text import sentences
 from analysis.cli import check_claims as command
 from analysis.display import percent
@@ -154,3 +154,33 @@ def test_a_number_speaks_of_the_name_in_its_own_clause(tmp_path: Path) -> None:
         ("63.3", "Beta"), ("52.0", "Gamma"), ("285 of 450", "Beta"),
     }  # fmt: skip
     assert {claim.verdict for claim in found if claim.kind == "percentage"} == {"OK"}
+
+
+@pytest.mark.parametrize(
+    ("text", "verdict"),
+    [
+        ("p = .012", "OK"), ("p = 0.0123", "OK"), ("p = 1.2e-2", "OK"), ("p < 0.05", "OK"),
+        ("p = 1.3e-2", "MISMATCH"), ("p = 0.013", "MISMATCH"), ("p < 0.01", "MISMATCH"),
+    ],
+)  # fmt: skip
+def test_p_values_are_compared_as_they_are_printed(
+    text: str, verdict: str, paper_results: Results
+) -> None:
+    rows = {name: row | {"p": 0.0123, "p_holm": 0.0123, "p_exact": 0.0123}
+            for name, row in paper_results["baselines"].items()}  # fmt: skip
+    changed = paper_results | {"baselines": rows}
+    names = names_from_results(changed)
+    found = check_claims(f"PACE was preferred over PAAK ({text}).", names, changed, latex=False)
+    assert [(claim.kind, claim.verdict) for claim in found] == [("p", verdict)]
+
+
+def test_intervals_and_p_belong_to_the_share_before_them(paper_results: Results) -> None:
+    low, high = (percent(bound) for bound in paper_results["baselines"]["PAAK"]["ci"])
+    text = (
+        f"PACE was preferred over PAAK in 59.3 % of all answers [{low}, {high}], p < .001 and over POSA-T "
+        f"in 67.9 %. Chosen in 59.3 % [{low}, {high}] (p < .001) over PAAK, in 67.9 % over POSA-T.\n"
+    )
+    found = check_claims(text, names_from_results(paper_results), paper_results, latex=False)
+    beside = [claim for claim in found if claim.kind in ("interval", "p")]
+    assert [claim.comparison for claim in beside] == ["PAAK"] * 4
+    assert {claim.verdict for claim in found} == {"OK"}
