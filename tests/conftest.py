@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,6 +30,20 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if absent:
         config.hook.pytest_deselected(items=absent)
         items[:] = [item for item in items if not item.get_closest_marker("shared")]
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """A worker process tells the controlling one what it left out."""
+    output = getattr(session.config, "workeroutput", None)
+    if output is not None:
+        output["absent"] = session.config.stash.get(_ABSENT, 0)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """Every worker collects everything, so the count of any of them is the count."""
+    output = getattr(node, "workeroutput", {})
+    node.config.stash[_ABSENT] = output.get("absent", 0)
 
 
 def pytest_terminal_summary(
