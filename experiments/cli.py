@@ -125,17 +125,21 @@ def progress_bars(again: str) -> Iterator[Callable[[str, int, int], None]]:
     )
 
     columns: list[Any] = [TextColumn("{task.description:<15}"), BarColumn(), MofNCompleteColumn()]
-    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bars:
-        tasks: dict[str, Any] = {}
+    bars = Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True))
+    tasks: dict[str, Any] = {}
 
-        def show(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=total)
-            bars.update(tasks[stage], completed=done, total=total)
+    def show(stage: str, done: int, total: int) -> None:
+        bars.start()  # only now, so that an error before the first step stays a single line
+        if stage not in tasks:
+            tasks[stage] = bars.add_task(stage, total=total)
+        bars.update(tasks[stage], completed=done, total=total)
 
-        try:
-            yield show
-        except KeyboardInterrupt:
+    try:
+        yield show
+    except KeyboardInterrupt:
+        bars.stop()
+        click.echo(f"interrupted; what is done is kept. Go on with: {again}", err=True)
+        sys.exit(130)
+    finally:
+        if tasks:
             bars.stop()
-            click.echo(f"interrupted; what is done is kept. Go on with: {again}", err=True)
-            sys.exit(130)
