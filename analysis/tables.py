@@ -237,7 +237,7 @@ def _escape_pipe(cell: str) -> str:
 
 def _aligned(rows: tuple[tuple[str, ...], ...]) -> list[str]:
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    widths[0] = min(widths[0], 36)
+    widths[0] = min(widths[0], max(24, 100 - sum(width + 2 for width in widths[1:])))
     lines = []
     for row in rows:
         first = row[0] if len(row[0]) <= widths[0] else row[0][: widths[0] - 1] + "…"

@@ -22,6 +22,8 @@ def test_intervals_and_tests_equal_r(shared_data: Path) -> None:
         assert binomial.wilson(k, n) == pytest.approx(case["wilson"], abs=1e-9)
         assert binomial.exact(k, n) == pytest.approx(case["cp"], abs=1e-9)
         assert binomial.exact_p(k, n) == pytest.approx(case["p_exact"], rel=1e-8)
+    paper = [binomial.exact_p(k, 840) for k in (570, 682, 498)]
+    assert binomial.holm(paper) == pytest.approx(expected["holm3"], rel=1e-9)
     demo = expected["holm_demo"]
     assert binomial.holm(demo["p"]) == pytest.approx(demo["holm"], abs=1e-12)
     assert binomial.benjamini_hochberg(demo["p"]) == pytest.approx(demo["bh"], abs=1e-12)
