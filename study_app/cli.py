@@ -247,6 +247,39 @@ def balance(
     click.echo(table(result))
 
 
+@study.command()
+@click.argument("study_toml", type=_folder)
+@click.option("--motions", type=click.IntRange(1, 10_000), required=True, help="Motions a scene.")
+@click.option("--participants", type=click.IntRange(2, 100_000), default=42, show_default=True)
+@click.option("--rate", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.6,
+              show_default=True, help="True preference for the target.")  # fmt: skip
+@click.option("--dropout", type=click.FloatRange(0, 0.95), default=0.0, show_default=True)
+@click.option("--runs", type=click.IntRange(10, 100_000), default=200, show_default=True)
+@click.option("--seed", type=int, default=0, show_default=True)
+@_json
+def forecast(
+    study_toml: Path,
+    motions: int,
+    participants: int,
+    rate: float,
+    dropout: float,
+    runs: int,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Forecast power and interval width of STUDY_TOML, by the report's own estimator."""
+    from dataclasses import asdict
+
+    from analysis import planner
+    from study_app.config import read_study
+    from study_app.forecast import study_plan
+
+    plan = study_plan(read_study(study_toml), motions, participants, rate, dropout, study_toml)
+    found = planner.forecast(plan, runs, seed)
+    record = {"plan": asdict(plan), "forecast": asdict(found)}
+    click.echo(json.dumps(record) if as_json else planner.plan_table(plan, [found]))
+
+
 @click.command()
 @_database
 @click.option("--host", default="127.0.0.1", show_default=True)
