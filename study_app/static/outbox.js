@@ -7,6 +7,7 @@
 const RETRY_MS = 2000;
 const LONGEST_RETRY_MS = 15_000;
 const BATCH = 50;
+const NOTABLE_WAIT_MS = 20;
 
 export class Outbox {
   /** @param {{events: string, answer: string, csrf: string, trial: string, onOffline: () => void, onAnswered: (next: string) => void}} options */
@@ -22,7 +23,7 @@ export class Outbox {
 
   /** Queue a report and send it at once: the server's clock is part of the proof. */
   report(kind, position, detail) {
-    this.waiting.push({ uuid: uuid(), kind, position, detail });
+    this.waiting.push({ uuid: uuid(), kind, position, detail, since: performance.now() });
     void this.flush();
   }
 
@@ -46,8 +47,13 @@ export class Outbox {
     if (this.posting || this.waiting.length === 0) return;
     this.posting = true;
     const batch = this.waiting.slice(0, BATCH);
+    // A report that waited for an earlier one to leave reaches the server's clock late by that much.
+    const events = batch.map(({ since, ...event }) => {
+      const waited = Math.round(performance.now() - since);
+      return waited < NOTABLE_WAIT_MS ? event : { ...event, detail: { ...event.detail, waited_ms: waited } };
+    });
     try {
-      const reply = await this.post(this.options.events, { events: batch });
+      const reply = await this.post(this.options.events, { events });
       await reply.text(); // an unread reply would be cut off when the page is left
       if (reply.status >= 500 || reply.status === 429) throw new Error("server is away");
       this.waiting.splice(0, batch.length);

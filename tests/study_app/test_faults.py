@@ -199,6 +199,20 @@ def test_a_servers_clock_that_was_set_back_proves_nothing_against_anybody(
     assert viewing_evidence(reports, "first", 1.0) == evidence
 
 
+@pytest.mark.parametrize(
+    ("waited_ms", "evidence"), [(0, "unproven"), (50, "unproven"), (150, "unknown")]
+)
+def test_a_start_that_reached_the_server_late_is_unknown_and_no_failure(
+    waited_ms: int, evidence: str
+) -> None:
+    begin = datetime(2026, 3, 1, tzinfo=UTC)
+    proof = {"view": 1, "covered": 1.0, "rate": 1, "hidden": False, "wall_ms": 1000}
+    start = {"view": 1, "waited_ms": waited_ms}
+    reports = [Report("play", "first", begin, start),
+               Report("complete", "first", begin + timedelta(seconds=0.8), proof)]  # fmt: skip
+    assert viewing_evidence(reports, "first", 1.0) == evidence
+
+
 @pytest.mark.parametrize("hours", [-48, 48])
 def test_a_jump_of_the_servers_clock_keeps_the_trial_and_the_answer(site: Any, hours: int) -> None:
     visitor = site.visitor()

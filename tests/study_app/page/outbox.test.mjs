@@ -48,6 +48,18 @@ test("a report leaves at once, with its own number and the page's token", async 
   assert.match(sent[0].body.events[0].uuid, /^[0-9a-f]{8}-[0-9a-f]{4}-4[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}$/);
 });
 
+test("a report that waited for an earlier one to leave says for how long", async () => {
+  const real = performance.now;
+  let now = 0;
+  performance.now = () => now;
+  box.report("stall", "first", {});
+  box.report("play", "first", { view: 1 });
+  now = 130;
+  await pass();
+  performance.now = real;
+  assert.deepEqual(sent.map((post) => post.body.events[0].detail), [{}, { view: 1, waited_ms: 130 }]);
+});
+
 for (const status of [0, 429, 503]) {
   test(`reports that met ${status || "no line"} come again as the same ones and say that they waited`, async () => {
     replies = [status];
