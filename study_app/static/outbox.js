@@ -13,7 +13,7 @@ export class Outbox {
   /** @param {{events: string, answer: string, csrf: string, trial: string, onOffline: () => void, onAnswered: (next: string) => void}} options */
   constructor(options) {
     this.options = options;
-    this.waiting = /** @type {object[]} */ ([]);
+    this.waiting = /** @type {{uuid: string, kind: string, position: string | null, detail: object, since: number}[]} */ ([]);
     this.sending = false;
     this.posting = false;
     this.delay = RETRY_MS;
