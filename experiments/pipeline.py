@@ -6,7 +6,6 @@ where it stopped, and a run that is complete does nothing. `catalogue.json` is w
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
@@ -167,8 +166,3 @@ def run_all(
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     return outcomes
-
-
-def cut_config(config: StimulusSetConfig, **changes: Any) -> StimulusSetConfig:
-    """A copy of a configuration with some fields changed (for tests and scripts)."""
-    return dataclasses.replace(config, **changes)

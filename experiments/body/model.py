@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-import torch
 from jaxtyping import Float, Integer
 from torch import Tensor
 
@@ -74,8 +73,3 @@ class BodyModel(Protocol):
     ) -> tuple[Float[Tensor, "T 22 3 3"], Float[Tensor, "T 22 3"]]:
         """World rotation and position of every joint."""
         ...
-
-
-def default_dtype() -> torch.dtype:
-    """Single precision everywhere except in gradient checks, which pass float64 tensors."""
-    return torch.float32
