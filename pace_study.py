@@ -23,6 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "scene": ("experiments.scene.cli:scene", "Bake and inspect rooms."),
     "stimuli": ("experiments.cli:stimuli", "Build, verify and tabulate a stimulus set."),
     "evaluate": ("experiments.cli:evaluate", "Place and score methods without rendering."),
+    "train": ("experiments.train_cli:train", "Train the networks that the project ships."),
     "render": ("experiments.cli:render", "Render one placement into a clip."),
     "study": ("study_app.cli:study", "Create, open, watch, close and export studies."),
     "serve": ("study_app.cli:serve", "Serve studies to participants."),
