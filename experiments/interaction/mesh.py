@@ -9,7 +9,6 @@ import torch
 from jaxtyping import Float, Integer
 
 from experiments.body.model import JOINT_NAMES, BodyModel
-from experiments.body.regions import contact_rows
 from experiments.motion.motion import Motion
 
 
@@ -35,10 +34,7 @@ class MovingBody:
 
 def feature_vertices(body: BodyModel) -> Integer[np.ndarray, " V"]:
     """The small mesh, and points that thicken its soles, seat and back."""
-    zero = torch.zeros((1, 22, 3), dtype=torch.float64)
-    rest = body.posed(zero, zero[:, 0]).vertices[0].numpy()
-    rows = contact_rows(rest, body.regions, body.subset)
-    return np.union1d(body.subset, rows).astype(np.int64)
+    return np.union1d(body.subset, body.contact_rows).astype(np.int64)
 
 
 def moving_body(motion: Motion, body: BodyModel) -> MovingBody:
