@@ -29,6 +29,15 @@ class PlacementSettings:
     contact_threshold: float = 0.5
     """A vertex is in contact where f_c exceeds this (POSA)."""
 
+    # Frame weights
+    weighting: Literal["geometric"] = "geometric"
+    """Rule of the weights k of PAAK-style and PACE."""
+    paak_mode: Literal["soft", "top_k"] = "soft"
+    """PAAK-style: weigh all frames (PACE's description), or drop all but the keyframes (PAAK's
+    name)."""
+    paak_top_share: float = 0.25
+    """Share of the frames that are keyframes under `top_k`."""
+
     # Start search
     grid_step: float = 0.2
     """Distance of neighbouring start positions, metres (POSA)."""
