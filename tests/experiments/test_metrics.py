@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from experiments.alteration import alteration_cost, foot_skate, joint_jerk, rigid_between
 from experiments.metrics import plausibility, skin_distances
-from experiments.placement.reference import nearest_label
+from experiments.placement.pointwise import nearest_label
 from experiments.placement.rigid import move_motion
 from experiments.placement.settings import PRESETS
 from experiments.scene.lookup import trilinear_reference

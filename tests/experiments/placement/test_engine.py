@@ -8,7 +8,7 @@ import torch
 
 from experiments.placement.candidates import Starts, exact_scores
 from experiments.placement.objectives import alteration_terms, total
-from experiments.placement.reference import reference_scores, reference_terms
+from experiments.placement.pointwise import pointwise_scores, pointwise_terms
 from experiments.placement.solver import altered_bodies
 
 
@@ -25,7 +25,7 @@ def test_the_fast_engine_equals_the_slow_one(make_problem, state, tolerance, tim
     changes = {"contact_tolerance": tolerance, "time_aware": time_aware}
     problem = make_problem(6, torch.float64, fps=20.0, **changes)
     yaw, translation, delta, shift = state
-    slow = reference_terms(problem, yaw, translation, delta, shift)
+    slow = pointwise_terms(problem, yaw, translation, delta, shift)
     placed = torch.tensor([yaw, *translation], dtype=torch.float64)
     parts = torch.as_tensor(delta), torch.as_tensor(shift)
     fast = problem.terms(altered_bodies(problem, placed, *parts))
@@ -40,7 +40,7 @@ def test_batched_scores_equal_the_slow_ones_start_by_start(make_problem) -> None
     yaw = rng.uniform(0, 2 * np.pi, 4)
     translation = np.column_stack([rng.uniform(0.4, 2.6, (4, 2)), rng.uniform(-0.05, 0.05, 4)])
     starts = Starts(yaw, translation, np.zeros(4))
-    slow = reference_scores(problem, yaw, translation)
+    slow = pointwise_scores(problem, yaw, translation)
     assert exact_scores(problem, starts) == pytest.approx(slow, rel=1e-9)
 
 

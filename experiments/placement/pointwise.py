@@ -1,7 +1,7 @@
-"""The slow, obvious engine: E_p and E_alt one frame and one vertex at a time, for tests.
+"""E_p and E_alt one frame and one vertex at a time: the oracle both engines are tested against.
 
-Written from the formulas alone and sharing no arithmetic with the fast engine but the skinning,
-which has tests of its own.
+Written from the formulas alone and sharing no arithmetic with the engines but the skinning, which
+has tests of its own.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from experiments.scene.lookup import trilinear_reference
 from experiments.scene.scene import Volumes
 
 
-def reference_terms(
+def pointwise_terms(
     problem: Problem,
     yaw: float,
     translation: Float[np.ndarray, "3"],
@@ -113,7 +113,7 @@ def nearest_label(volumes: Volumes, point: Float[np.ndarray, "3"]) -> int:
     return int(volumes.label[node[0], node[1], node[2]])
 
 
-def reference_scores(
+def pointwise_scores(
     problem: Problem,
     yaws: Float[np.ndarray, " N"],
     translations: Float[np.ndarray, "N 3"],
@@ -121,7 +121,7 @@ def reference_scores(
     """E_p of the unaltered motion at every start, one after the other."""
     zero = np.zeros_like(problem.motion.pose), np.zeros_like(problem.motion.transl)
     pairs = zip(yaws, translations, strict=True)
-    found = [reference_terms(problem, float(yaw), shift, *zero) for yaw, shift in pairs]
+    found = [pointwise_terms(problem, float(yaw), shift, *zero) for yaw, shift in pairs]
     return np.array([sum(terms.values()) for terms in found])
 
 
