@@ -75,7 +75,7 @@ def rotations_to_6d(axis_angle: Float[Tensor, "*N 3"]) -> Float[Tensor, "*N 6"]:
 
 def rotations_from_6d(columns: Float[Tensor, "*N 6"]) -> Float[Tensor, "*N 3"]:
     """Axis-angle vectors of two columns of any length and angle, made orthonormal (Gram-Schmidt)."""
-    pair = columns.unflatten(-1, (2, 3)).transpose(-1, -2)
+    pair = columns.reshape(*columns.shape[:-1], 2, 3).transpose(-1, -2)
     rotvec: Tensor = roma.rotmat_to_rotvec(roma.special_gramschmidt(pair, epsilon=1e-8))
     return rotvec
 
@@ -85,7 +85,7 @@ def body_descriptor(body: BodyModel) -> Float[np.ndarray, "10"]:
 
     Decimetres away from a 1.75 m adult, so that the numbers are about as large as shape parameters.
     """
-    measures = body_measures(body)
+    measures = body_measures(body)  # type: ignore[arg-type]  # bodies hash by identity
     lengths = [
         measures.stature,
         measures.thigh,
@@ -98,7 +98,8 @@ def body_descriptor(body: BodyModel) -> Float[np.ndarray, "10"]:
         measures.shoulder_width,
         _girth(body),
     ]
-    return 10.0 * (np.array(lengths) - _USUAL)
+    descriptor: Float[np.ndarray, "10"] = 10.0 * (np.array(lengths) - _USUAL)
+    return descriptor
 
 
 _USUAL = np.array([1.75, 0.41, 0.44, 0.92, 0.076, 0.27, 0.25, 0.17, 0.36, 0.09])

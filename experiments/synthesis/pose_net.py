@@ -33,4 +33,4 @@ class PoseNet(nn.Module):
         poses, _ = self.lstm(ends)
         context = [poses.flatten(1), self.scene_in(feature), self.route_in(route.flatten(1))]
         found: Tensor = self.out(torch.relu(self.hidden(torch.cat(context, dim=1))))
-        return found.unflatten(1, (SEGMENT, POSE_SIZE))
+        return found.reshape(-1, SEGMENT, POSE_SIZE)

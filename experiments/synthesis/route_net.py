@@ -32,4 +32,4 @@ class RouteNet(nn.Module):
         states, _ = self.lstm(ends)
         values = torch.cat([states.flatten(1), self.scene_in(feature)], dim=1)
         route: Tensor = self.out(torch.relu(self.hidden(values)))
-        return route.unflatten(1, (SEGMENT, STATE_SIZE))
+        return route.reshape(-1, SEGMENT, STATE_SIZE)

@@ -56,7 +56,8 @@ def scene_points(
     over = u + v > 1
     u, v = np.where(over, 1 - u, u)[:, None], np.where(over, 1 - v, v)[:, None]
     a, b, c = corners[face, 0], corners[face, 1], corners[face, 2]
-    return (a + u * (b - a) + v * (c - a)).astype(np.float32)
+    points: Float[np.ndarray, "N 3"] = (a + u * (b - a) + v * (c - a)).astype(np.float32)
+    return points
 
 
 def _over_points(values: Float[Tensor, "R N C"]) -> Float[Tensor, "R N C"]:

@@ -59,8 +59,10 @@ def load_nets(folder: Path = FOLDER) -> SynthesisNets:
             raise InputError(files[kind], "recipe", note.recipe, wanted)
     subgoal, route, pose = SubgoalNet(), RouteNet(), PoseNet()
     nets: dict[Kind, nn.Module] = {"subgoal": subgoal, "route": route, "pose": pose}
-    hashes = {kind: read_weights(net, kind, files[kind]) for kind, net in nets.items()}
-    return SynthesisNets(subgoal, route, pose, notes["subgoal"], dict(hashes))
+    hashes: dict[str, str] = {}
+    for kind, net in nets.items():
+        hashes[kind] = read_weights(net, kind, files[kind])
+    return SynthesisNets(subgoal, route, pose, notes["subgoal"], hashes)
 
 
 def weights_file(kind: Kind, folder: Path = FOLDER) -> Path:
