@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from experiments.body.model import BodyModel
+from experiments.methods.ablations import pace_no_motion, pace_no_pose
 from experiments.methods.paak import paak
-from experiments.methods.pace import pace, pace_no_motion, pace_no_pose
+from experiments.methods.pace import pace
+from experiments.methods.plus import paak_plus, pace_plus, posa_t_plus
 from experiments.methods.posa_t import posa_t
 from experiments.motion.motion import Motion
 from experiments.placement.placement import Placement
@@ -75,6 +77,30 @@ METHODS: dict[str, Method] = {
         alters_motion=True,
         study=False,
         block="ablation",
+    ),
+    "posa_t_plus": Method(
+        posa_t_plus,
+        "POSA-T+ (ours)",
+        "POSA-T with the scene terms of PACE+",
+        alters_motion=False,
+        study=False,
+        block="plus",
+    ),
+    "paak_plus": Method(
+        paak_plus,
+        "PAAK-style+ (ours)",
+        "PAAK-style placement with the scene terms of PACE+",
+        alters_motion=False,
+        study=False,
+        block="plus",
+    ),
+    "pace_plus": Method(
+        pace_plus,
+        "PACE+ (ours)",
+        "PACE; contacts must not sink in, standing feet are held, nothing trembles",
+        alters_motion=True,
+        study=False,
+        block="plus",
     ),
 }
 """Every method there is, in the order of tables."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -12,6 +11,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from experiments.motion.motion import Motion
 from experiments.placement.bones import bone_points
 from experiments.placement.candidates import Starts, class_match
 from experiments.placement.errors import NoAdmissibleStart, OptimisationFailed
@@ -19,6 +19,7 @@ from experiments.placement.placement import Placement
 from experiments.placement.problem import Problem
 from experiments.placement.rigid import move, move_motion
 from experiments.placement.solver import Fit, altered_bodies
+from experiments.placement.spread import spread_alteration
 
 
 def best_fit(problem: Problem, fits: Sequence[Fit]) -> Fit:
@@ -90,15 +91,21 @@ def _distance(problem: Problem, fit: Fit) -> Float[Tensor, "T V"]:
         return problem.field.distance(bodies, problem.contact)
 
 
+def _weights_of(problem: Problem, whole: Motion) -> Float[np.ndarray, " T"]:
+    """k by frame of the whole clip, 0 for frames that were not optimised."""
+    weights: Float[np.ndarray, " T"] = np.zeros(whole.n_frames)
+    weights[np.searchsorted(whole.times, problem.motion.times)] = problem.weights.values
+    return weights
+
+
 def to_placement(
     problem: Problem, fits: Sequence[Fit], method: str, seed: int, info: dict[str, Any]
 ) -> Placement:
     """The best fit as a record: the placed motion, its terms, and what it cost to find."""
     fit = best_fit(problem, fits)
     delta, shift = fit.delta.double().numpy(), fit.shift.double().numpy()
-    motion = dataclasses.replace(
-        problem.motion, pose=problem.motion.pose + delta, transl=problem.motion.transl + shift
-    )
+    whole = problem.whole or problem.motion
+    motion = spread_alteration(whole, problem.motion, delta, shift)
     centre = problem.centre.double().numpy()
     contact = problem.contact.numpy()
     return Placement(
@@ -109,7 +116,7 @@ def to_placement(
         yaw=fit.yaw,
         motion=move_motion(motion, problem.body, fit.yaw, fit.translation, centre),
         altered=bool(np.any(delta) or np.any(shift)),
-        weights=problem.weights.values,
+        weights=_weights_of(problem, whole),
         terms={**fit.terms, "total": fit.energy},
         seed=seed,
         config_hash=problem.settings.config_hash(),
@@ -119,6 +126,7 @@ def to_placement(
             "weighting": problem.weights.rule,
             "expects": problem.expected_classes(),
             "frames_with_contact": float(contact.any(1).mean()),
+            "frames_optimised": problem.motion.n_frames,
             "starts": len(fits),
             "chosen_start": next(index for index, item in enumerate(fits) if item is fit),
             "energies": [item.energy for item in fits],

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from experiments.body.model import BodyModel
 from experiments.interaction.features import InteractionFeatures
-from experiments.methods.outcome import to_placement
+from experiments.methods.preparation import prepare
+from experiments.methods.rigid import place_rigid
 from experiments.motion.motion import Motion
-from experiments.placement.candidates import find_starts
-from experiments.placement.features import choose_features
 from experiments.placement.placement import Placement
-from experiments.placement.problem import build_problem
 from experiments.placement.settings import PlacementSettings
-from experiments.placement.solver import fit_rigid
 from experiments.scene.scene import Scene
 from experiments.weighting.frame_weights import frame_weights, keyframes_only
 from experiments.weighting.weights import FrameWeights
@@ -28,14 +25,8 @@ def paak(
 
     Raises `PlacementError` where there is no place.
     """
-    features = choose_features(motion, scene, body, settings)
-    weights = paak_weights(motion, body, features, settings, seed)
-    problem = build_problem(motion, scene, body, settings, features, weights)
-    starts = find_starts(problem)
-    fits = [
-        fit_rigid(problem, float(starts.yaw[i]), starts.translation[i]) for i in range(len(starts))
-    ]
-    return to_placement(problem, fits, "paak", seed, {})
+    problem = prepare(motion, scene, body, settings, seed, paak_weights)
+    return place_rigid(problem, "paak", seed)
 
 
 def paak_weights(

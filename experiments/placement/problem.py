@@ -93,6 +93,8 @@ class Problem(RigidProblem):
     """What frame-to-frame differences are multiplied by; see `time_step_scale`."""
     floor: float
     """Height of the clip's own floor, metres."""
+    whole: Motion | None = None
+    """The clip that `motion` was thinned from; None if it was not."""
 
     @property
     def vertex_ids(self) -> Integer[np.ndarray, " V"]:

@@ -95,6 +95,11 @@ class PlacementSettings:
     """Weight of L_mot, per rad²."""
     lambda_tau: float = 50.0
     """Weight of the translation half inside L_mot, per m²: `lambda_mot` * `lambda_tau` in all."""
+    slide_weight: float = 0.0
+    """Weight of the steps that an alteration adds to standing feet, per m² and foot (ours)."""
+    bend_weight: float = 0.0
+    """Weight of squared second differences of the alteration along time, per rad², and times
+    `lambda_tau` per m² (ours)."""
     time_aware: bool = True
     """Scale frame-to-frame differences to steps of 1/30 s; False is the printed form."""
 
@@ -114,6 +119,9 @@ class PlacementSettings:
     give_up_factor: float | None = 2.0
     """Give a start up after three outer steps if it is this many times worse than the best start
     so far; None never gives up."""
+    rescue: bool = True
+    """Run an ablation again, smoother and then from PACE's solution, where it ends above that;
+    False shows what a stalled optimiser answers."""
 
     def config_hash(self) -> str:
         """Hash of every value, for provenance."""

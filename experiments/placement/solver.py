@@ -16,6 +16,7 @@ from experiments.placement.optimiser import Energy, Minimum, minimise
 from experiments.placement.problem import Problem
 from experiments.placement.rigid import move
 from experiments.placement.settings import PlacementSettings
+from experiments.placement.steadiness import Steadiness
 from experiments.placement.whitening import alteration_basis
 
 GIVE_UP_STEPS = 3
@@ -80,6 +81,7 @@ def fit_altered(
     """
     weights = energy_settings or problem.settings
     variables = _Variables(problem, rigid)
+    steadiness = Steadiness(problem, weights)
 
     def energy(huber: float) -> Energy:
         def value(state: Float[Tensor, " N"]) -> Float[Tensor, ""]:
@@ -87,7 +89,8 @@ def fit_altered(
             bodies = altered_bodies(problem, placed, delta, shift)
             terms = problem.terms(bodies, huber, semantics=False)
             costs = alteration_terms(delta, shift, problem.k, problem.step_scale, weights)
-            return total({**terms, **costs})
+            extra = steadiness.terms(bodies, placed, delta, shift)
+            return total({**terms, **costs, **extra})
 
         return value
 
@@ -189,9 +192,11 @@ def _fit(
     """Name every term of a state, with the printed penalty and the class mismatches."""
     delta, shift = (part.detach() for part in alteration)
     with torch.no_grad():
-        terms = problem.terms(altered_bodies(problem, placed, delta, shift))
+        bodies = altered_bodies(problem, placed, delta, shift)
+        terms = problem.terms(bodies)
         costs = alteration_terms(delta, shift, problem.k, problem.step_scale, weights)
-    named = {name: float(value) for name, value in {**terms, **costs}.items()}
+        extra = Steadiness(problem, weights).terms(bodies, placed, delta, shift)
+    named = {name: float(value) for name, value in {**terms, **costs, **extra}.items()}
     numbers = placed.detach().double().numpy()
     return Fit(float(numbers[0]), numbers[1:], delta, shift, named)
 

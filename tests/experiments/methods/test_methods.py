@@ -8,7 +8,8 @@ import pytest
 
 from experiments.methods import METHODS
 from experiments.methods.outcome import best_fit, fault
-from experiments.methods.pace import pace_problem, rigid_fits
+from experiments.methods.preparation import prepare
+from experiments.methods.rigid import rigid_fits
 from experiments.metrics import plausibility
 from experiments.placement.errors import NoAdmissibleStart, OptimisationFailed
 from experiments.placement.features import choose_features
@@ -61,13 +62,13 @@ def test_the_placed_motion_reproduces_the_recorded_energy(placed, slim, seat_roo
 
 
 def test_altering_never_ends_above_the_rigid_optimum_it_began_at(sit, slim, seat_room) -> None:
-    problem = pace_problem(sit(30), seat_room, slim, FAST)
+    problem = prepare(sit(30), seat_room, slim, FAST, 0)
     rigid = rigid_fits(problem)[0]
     assert fit_altered(problem, rigid).energy <= rigid.energy
 
 
 def test_fitting_never_ends_above_its_start(sit, slim, seat_room) -> None:
-    problem = pace_problem(sit(30), seat_room, slim, FAST)
+    problem = prepare(sit(30), seat_room, slim, FAST, 0)
     best = rigid_fits(problem)[0]
     again = fit_rigid(problem, best.yaw, best.translation)
     assert again.energy <= best.energy + 1e-6
@@ -111,7 +112,7 @@ def test_a_body_that_can_only_stand_inside_things_is_refused(walk, slim) -> None
 
 
 def test_a_fit_deep_inside_something_is_refused(sit, slim, seat_room) -> None:
-    problem = pace_problem(sit(20), seat_room, slim, FAST)
+    problem = prepare(sit(20), seat_room, slim, FAST, 0)
     sound = rigid_fits(problem)[0]
     sunk = dataclasses.replace(sound, translation=sound.translation - np.array([0.0, 0.0, 0.5]))
     assert fault(problem, sound) == ""
@@ -121,7 +122,7 @@ def test_a_fit_deep_inside_something_is_refused(sit, slim, seat_room) -> None:
 
 
 def test_hands_and_seats_that_hang_in_the_air_are_refused(sit, slim, seat_room) -> None:
-    problem = pace_problem(sit(20), seat_room, slim, FAST)
+    problem = prepare(sit(20), seat_room, slim, FAST, 0)
     sound = rigid_fits(problem)[0]
     above = dataclasses.replace(sound, translation=sound.translation + np.array([0.0, 0.0, 0.3]))
     assert re.match(
@@ -130,7 +131,7 @@ def test_hands_and_seats_that_hang_in_the_air_are_refused(sit, slim, seat_room) 
 
 
 def test_energies_that_are_not_finite_are_no_placement(sit, slim, seat_room) -> None:
-    problem = pace_problem(sit(20), seat_room, slim, FAST)
+    problem = prepare(sit(20), seat_room, slim, FAST, 0)
     broken = dataclasses.replace(rigid_fits(problem)[0], terms={"contact": float("nan")})
     with pytest.raises(OptimisationFailed, match="motion sit in scene synthetic: no start reached"):
         best_fit(problem, [broken])
