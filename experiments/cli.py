@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -101,19 +102,50 @@ def evaluate(config: Path, out: Path, jobs: int, as_json: bool) -> None:
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="The .mp4 to write.")
 @click.option("--preset", default="540p", show_default=True, help="Name of a render preset.")
 @click.option(
-    "--tiling", type=click.Choice(["grid", "strip", "single"]), default="grid", show_default=True
+    "--tiling",
+    type=click.Choice(["grid", "strip", "single"]),
+    default="grid",
+    show_default=True,
+    help="How the four fixed views share a clip.",
 )
+@click.option(
+    "--camera",
+    default="fixed",
+    show_default=True,
+    help="fixed (the views of a study clip), orbit, follow, or a camera file POSE.json.",
+)
+@click.option("--still", type=float, help="Write one picture (.png, .jpg) of this second.")
+@click.option("--freeze", type=float, help="Hold the body at this second: a turntable with orbit.")
+@click.option("--seconds", type=float, help="Length of a clip with --freeze.")
 @_JSON
-def render(placement: Path, out: Path, preset: str, tiling: str, as_json: bool) -> None:
-    """Render one PLACEMENT (.json or .npz of a set's placements/ folder) into a clip."""
-    from experiments.clips import render_placement
+def render(
+    placement: Path,
+    out: Path,
+    preset: str,
+    tiling: str,
+    camera: str,
+    still: float | None,
+    freeze: float | None,
+    seconds: float | None,
+    as_json: bool,
+) -> None:
+    """Render one PLACEMENT (.json or .npz of a set's placements/ folder) from any perspective."""
+    from experiments.perspectives import Perspective, render_perspective
 
-    clip = render_placement(placement, out, preset, tiling)
-    click.echo(json.dumps(clip) if as_json else f"{out}: {clip['n_frames']} frames")
+    perspective = Perspective(camera, still, freeze, seconds)
+    with progress_bars(shlex.join(sys.argv), "nothing was written") as show:
+        record = render_perspective(
+            placement, out, perspective, preset, tiling, lambda done, all_: show("draw", done, all_)
+        )
+    size = f"{record['width']} x {record['height']} pixels"
+    frames = f"{record['n_frames']} frames, " if "n_frames" in record else ""
+    click.echo(json.dumps(record) if as_json else f"{out}: {frames}{size}")
 
 
 @contextmanager
-def progress_bars(again: str) -> Iterator[Callable[[str, int, int], None]]:
+def progress_bars(
+    again: str, kept: str = "what is done is kept"
+) -> Iterator[Callable[[str, int, int], None]]:
     """Bars on stderr, one a stage; Ctrl-C says how to go on and exits with status 130."""
     from rich.console import Console
     from rich.progress import (
@@ -138,7 +170,7 @@ def progress_bars(again: str) -> Iterator[Callable[[str, int, int], None]]:
         yield show
     except KeyboardInterrupt:
         bars.stop()
-        click.echo(f"interrupted; what is done is kept. Go on with: {again}", err=True)
+        click.echo(f"interrupted; {kept}. Go on with: {again}", err=True)
         sys.exit(130)
     finally:
         if tasks:

@@ -106,31 +106,6 @@ def skinned(body: BodyModel, motion: Motion) -> Float[np.ndarray, "T V 3"]:
     return np.ascontiguousarray(vertices.numpy())
 
 
-def render_placement(placement: Path, out: Path, preset_name: str, tiling: str) -> dict[str, Any]:
-    """Render one placement by itself; returns the clip's record."""
-    settings = preset(preset_name, tiling=tiling)
-    placed = read_placement(placement)
-    body, scene, parts = (
-        load_body(placed.motion.body),
-        load_room(placed.scene),
-        stage_parts(placed.scene),
-    )
-    vertices = skinned(body, placed.motion)
-    rig = choose_cameras(
-        parts, scene.room_size, scene.floor_z, [vertices], body.regions, body.faces, settings
-    )
-    stage = Stage(
-        parts,
-        scene.room_size,
-        vertices,
-        body.faces,
-        settings.fps,
-        scene.floor_z,
-        regions=body.regions,
-    )
-    return dataclasses.asdict(render_clip(stage, rig, settings, out, out.with_suffix(".jpg")))
-
-
 def _take(
     job: RenderJob, body: BodyModel, role: str, method: str, seconds: float | None = None
 ) -> Take:

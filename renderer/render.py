@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,12 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float, Integer, UInt8
 
+from renderer.camera_path import same_cutaway
 from renderer.cameras import CameraRig, CameraView
 from renderer.files import InputError, file_sha256
 from renderer.mosaic import tile
 from renderer.settings import RenderSettings
 from renderer.stage import Stage
-from renderer.video import CODEC, write_image, write_video
+from renderer.video import CODEC, EncodedVideo, write_image, write_video
 
 if TYPE_CHECKING:
     from renderer.session import Session
@@ -70,30 +72,63 @@ def render_clip(
 
         video = write_video(frames(), target_mp4, settings.clip_size, settings.fps, settings.crf)
         write_image(poster, first[0])
-    width, height = settings.clip_size
-    return RenderedClip(
-        file=target_mp4.name,
-        poster=poster.name,
-        sha256=file_sha256(target_mp4),
-        frames_sha256=video.frames_sha256,
-        n_frames=video.n_frames,
-        width=width,
-        height=height,
-        fps=settings.fps,
-        duration_s=video.n_frames / settings.fps,
-        codec=CODEC,
-    )
+    return _record(target_mp4, poster, video, settings)
+
+
+def render_path(
+    stage: Stage,
+    views: Sequence[CameraView],
+    frames: Integer[np.ndarray, " N"],
+    settings: RenderSettings,
+    target_mp4: Path,
+    poster: Path,
+    progress: Progress | None = None,
+) -> RenderedClip:
+    """A clip of a moving camera: `views[n]` shows the body of frame `frames[n]`, drawn in full.
+
+    Output runs at `settings.fps`; one view fills the picture. Raises as `render_clip` does.
+    """
+    require_drawable(stage)
+    settings = dataclasses.replace(settings, tiling="single")
+    first: list[UInt8[np.ndarray, "h w 3"]] = []
+
+    def pictures() -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+        done = 0
+        for run in same_cutaway(tuple(views)):
+            with open_session(stage, run[:1], settings) as session:
+                for view in run:
+                    picture = session.full_from(stage.vertices[frames[done]], view)
+                    done += 1
+                    if done == 1:
+                        first.append(picture)
+                    yield picture
+                    if progress is not None:
+                        progress(done, len(views))
+
+    video = write_video(pictures(), target_mp4, settings.clip_size, settings.fps, settings.crf)
+    write_image(poster, first[0])
+    return _record(target_mp4, poster, video, settings)
 
 
 def render_still(
     stage: Stage, rig: CameraRig, view: str, frame: int, settings: RenderSettings
 ) -> UInt8[np.ndarray, "h w 3"]:
     """One view of one frame as an RGB picture, drawn in full."""
+    return render_stills(stage, [(rig.view(view), frame)], settings)[0]
+
+
+def render_stills(
+    stage: Stage, shots: Sequence[tuple[CameraView, int]], settings: RenderSettings
+) -> list[UInt8[np.ndarray, "h w 3"]]:
+    """RGB pictures of (camera, frame) pairs, each drawn in full."""
     require_drawable(stage)
-    if not -len(stage.vertices) <= frame < len(stage.vertices):
-        raise InputError("stage", "frame", frame, f"0 to {len(stage.vertices) - 1}")
-    with open_session(stage, (rig.view(view),), settings) as session:
-        return session.full(stage.vertices[frame], 0)
+    pictures = []
+    for view, frame in shots:
+        if not -len(stage.vertices) <= frame < len(stage.vertices):
+            raise InputError("stage", "frame", frame, f"0 to {len(stage.vertices) - 1}")
+        with open_session(stage, (view,), settings) as session:
+            pictures.append(session.full(stage.vertices[frame], 0))
+    return pictures
 
 
 def output_frames(n_frames: int, fps: float, wanted_fps: float) -> Integer[np.ndarray, " N"]:
@@ -134,3 +169,21 @@ def open_session(stage: Stage, views: Sequence[CameraView], settings: RenderSett
     from renderer.session import Session
 
     return Session(stage, tuple(views), settings)
+
+
+def _record(
+    target_mp4: Path, poster: Path, video: EncodedVideo, settings: RenderSettings
+) -> RenderedClip:
+    width, height = settings.clip_size
+    return RenderedClip(
+        file=target_mp4.name,
+        poster=poster.name,
+        sha256=file_sha256(target_mp4),
+        frames_sha256=video.frames_sha256,
+        n_frames=video.n_frames,
+        width=width,
+        height=height,
+        fps=settings.fps,
+        duration_s=video.n_frames / settings.fps,
+        codec=CODEC,
+    )

@@ -74,6 +74,19 @@ class Session:
         fast.forget_shadow(state.slot)
         return picture
 
+    def full_from(
+        self, vertices: Float[np.ndarray, "V 3"], view: CameraView
+    ) -> UInt8[np.ndarray, "h w 3"]:
+        """A full picture from any camera that hides what the session's first view hides."""
+        room, fast = self._opened()
+        if view.hidden != room.views[0].view.hidden:
+            raise ValueError("the session was opened for another cutaway")
+        fast.place(vertices)
+        slot = room.views[0].slot
+        picture = room.full_redraw_of(view, slot, self._body)
+        fast.forget_shadow(slot)
+        return picture
+
     def dirty_share(self, view: int) -> float:
         """Share of the picture that the last frame redrew in this view."""
         room, fast = self._opened()
