@@ -36,18 +36,21 @@ def read_motion_file(path: Path, body_name: str = "male_slim", fps: float | None
     `.txt` or `.json`. Raises `InputError` naming file, field and value.
     """
     figure = figure_of(body_name)
-    suffix = path.suffix.lower()
-    if suffix == ".npz" and _is_ours(path):
+    if path.suffix.lower() == ".npz" and is_own(path):
         return _own(path, body_name)
-    if suffix == ".amc":
-        capture = read_amc(path, fps=CMU_RATE_HZ if fps is None else fps)
-    elif suffix in _READERS:
-        capture = _READERS[suffix](path)
-    else:
-        known = ", ".join((".amc", *_READERS))
-        raise InputError(path, "suffix", path.suffix, f"one of {known}")
-    named = dataclasses.replace(adapt(capture, figure), motion_id=path.stem)
+    named = dataclasses.replace(adapt(read_capture(path, fps), figure), motion_id=path.stem)
     return clean_recording(named, figure)
+
+
+def read_capture(path: Path, fps: float | None = None) -> Capture:
+    """A recording on its own skeleton, by suffix as in `read_motion_file`. Raises `InputError`."""
+    suffix = path.suffix.lower()
+    if suffix == ".amc":
+        return read_amc(path, fps=CMU_RATE_HZ if fps is None else fps)
+    if suffix in _READERS:
+        return _READERS[suffix](path)
+    known = ", ".join((".amc", *_READERS))
+    raise InputError(path, "suffix", path.suffix, f"one of {known}")
 
 
 def adapt(capture: Capture, figure: Figure) -> Motion:
@@ -57,7 +60,8 @@ def adapt(capture: Capture, figure: Figure) -> Motion:
     return dataclasses.replace(motion, transl=motion.transl - start)
 
 
-def _is_ours(path: Path) -> bool:
+def is_own(path: Path) -> bool:
+    """Whether this is a motion that this project wrote."""
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             return "schema_version" in archive.files
