@@ -21,6 +21,7 @@ _ADVICE = {
     "osmesa": "libOSMesa (system package libosmesa6), or the render setting platform = 'egl'",
     "egl": "EGL without a screen (system packages libegl1, libgl1-mesa-dri), or platform = 'osmesa'",
 }
+_EITHER = "OSMesa (system package libosmesa6) or EGL (libegl1, libgl1-mesa-dri)"
 
 
 class _Held:
@@ -35,7 +36,7 @@ class _Held:
 
 
 @contextmanager
-def offscreen(platform: str = "osmesa") -> Iterator[str]:
+def offscreen(platform: str = "auto") -> Iterator[str]:
     """Make this process's context current; gives the name of the platform in use.
 
     The context outlives the block, so that the next clip finds its shaders compiled; `release`
@@ -45,7 +46,7 @@ def offscreen(platform: str = "osmesa") -> Iterator[str]:
     _require_free()
     name = choose_platform(platform)
     if _Held.context is None:
-        _create(name)
+        _create(name, platform)
     elif _Held.platform != name:
         raise _refusal(name, f"{_Held.platform} is in use in this process")
     _Held.in_use = True
@@ -99,7 +100,7 @@ def _require_free() -> None:
         )
 
 
-def _create(name: str) -> None:
+def _create(name: str, asked: str) -> None:
     bound = os.environ.get("PYOPENGL_PLATFORM")
     if "OpenGL" in sys.modules and bound != name:
         raise _refusal(name, f"OpenGL was imported for {bound}")
@@ -109,6 +110,8 @@ def _create(name: str) -> None:
     except Exception as error:
         # PyOpenGL reports a missing library as ImportError, AttributeError or its own types.
         found = f"{type(error).__name__}: {error}".replace("'", "")
+        if asked == "auto":
+            raise InputError("renderer", "platform", f"auto ({found})", _EITHER) from None
         raise _refusal(name, found) from None
     _Held.platform, _Held.context, _Held.pid = name, context, os.getpid()
     _Held.number += 1

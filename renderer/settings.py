@@ -36,8 +36,8 @@ class RenderSettings:
     """Samples a pixel: 4, or 0 for no anti-aliasing."""
     crf: int = 18
     """x264's constant rate factor; 18 is visually close to lossless."""
-    platform: str = "osmesa"
-    """auto: OSMesa where its library is found, else EGL."""
+    platform: str = "auto"
+    """auto: OSMesa where its library is found, else EGL; the one in use goes into the catalogue."""
     shadow_size: int = 2048
     """Texels along a side of the key light's shadow map."""
 

@@ -11,10 +11,10 @@ from renderer.video import ffmpeg_version
 _PACKAGES = ("pyrender-maintained", "PyOpenGL", "imageio-ffmpeg", "numpy", "trimesh", "embreex")
 
 
-def render_versions(platform: str = "osmesa") -> dict[str, str]:
+def render_versions(platform: str = "auto") -> dict[str, str]:
     """Platform, GL renderer, Mesa, LLVM, ffmpeg and the Python packages that decide the pixels.
 
-    Raises `InputError` when the platform's library or ffmpeg is missing.
+    Raises `InputError` when no platform's library or ffmpeg is there.
     """
     with offscreen(platform) as name:
         from OpenGL import GL

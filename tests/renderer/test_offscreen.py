@@ -39,7 +39,7 @@ def in_fresh_process(program: str, tmp_path: Path, site: str = "", **environment
 def test_a_missing_osmesa_is_one_line_that_names_the_package(tmp_path):
     program = (
         "from renderer.versions import render_versions\nfrom renderer.files import InputError\n"
-        "try: render_versions()\nexcept InputError as error: print(error)\n"
+        "try: render_versions('osmesa')\nexcept InputError as error: print(error)\n"
     )
     result = in_fresh_process(program, tmp_path, WITHOUT_OSMESA)
     assert result.stdout.startswith("renderer: platform: got 'osmesa (") and not result.stderr
@@ -53,6 +53,20 @@ def test_where_osmesa_is_gone_auto_takes_egl(tmp_path):
     )
     result = in_fresh_process(program, tmp_path, WITHOUT_OSMESA)
     assert result.stdout.strip() == "egl", result.stderr
+
+
+def test_where_neither_is_found_one_line_names_both(tmp_path):
+    program = (
+        "from renderer.versions import render_versions\nfrom renderer.files import InputError\n"
+        "try: render_versions()\nexcept InputError as error: print(error)\n"
+    )
+    neither = WITHOUT_OSMESA.replace(
+        "if 'OSMesa' in str(name)", "if 'OSMesa' in str(name) or 'EGL' in str(name)"
+    )
+    result = in_fresh_process(program, tmp_path, neither)
+    assert result.stdout.startswith("renderer: platform: got 'auto (") and not result.stderr
+    assert "libosmesa6" in result.stdout and "libegl1" in result.stdout
+    assert result.stdout.count("\n") == 1
 
 
 def test_opengl_bound_to_another_platform_is_explained(tmp_path):
