@@ -30,8 +30,9 @@ class PlacementSettings:
     """A vertex is in contact where f_c exceeds this (POSA)."""
 
     # Frame weights
-    weighting: Literal["geometric"] = "geometric"
-    """Rule of the weights k of PAAK-style and PACE."""
+    weighting: Literal["paak", "geometric", "uniform"] = "geometric"
+    """Rule of the weights k of PAAK-style and PACE: the printed K = lambda_g K_g^ + lambda_b W_d, the
+    geometric weight K_g itself, or every frame alike."""
     paak_mode: Literal["soft", "top_k"] = "soft"
     """PAAK-style: weigh all frames (PACE's description), or drop all but the keyframes (PAAK's
     name)."""
@@ -104,6 +105,9 @@ class PlacementSettings:
     """Scale frame-to-frame differences to steps of 1/30 s; False is the printed form."""
 
     # Optimiser
+    engine: Literal["batched", "reference"] = "batched"
+    """How energies are computed: all frames and many starts at once, or frame by frame as POSA's
+    code does, every start scored exactly. Equal results, very different cost."""
     parameterisation: Literal["whitened", "raw", "dct"] = "whitened"
     """Variables of the alteration: whitened along time, one a frame, or low frequencies alone."""
     dct_per_frame: float = 16 / 90

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
 from experiments.body.model import BodyModel
@@ -12,9 +14,18 @@ from experiments.interaction.features import InteractionFeatures
 from experiments.interaction.mesh import moving_body
 from experiments.motion.motion import Motion
 from experiments.placement.settings import PlacementSettings
+from experiments.weighting.diversity import diversity, gradient_factors
 from experiments.weighting.geometric import geometric_weights
-from experiments.weighting.weights import FrameWeights
+from experiments.weighting.inputs import MotionInputs, motion_inputs
+from experiments.weighting.network import FrameWeightNetwork
+from experiments.weighting.weights import FrameWeights, uniform_weights
+from experiments.weighting.weights_file import load_network
 from renderer.files import InputError
+
+LAMBDA_G = 0.5
+"""Share of the estimated geometric weight (ours: PACE gives neither factor)."""
+LAMBDA_B = 0.5
+"""Share of the diversity score (ours)."""
 
 
 def frame_weights(
@@ -26,14 +37,41 @@ def frame_weights(
 ) -> FrameWeights:
     """k of every frame of a motion, mean 1, by the rule that `settings.weighting` names.
 
-    Depends on the motion and on what it is expected to touch, not on where it goes; methods that
-    are given the same features and seed use the same weights.
+    `paak` is the printed K; `geometric` is K_g itself, which the network only estimates; `uniform`
+    lets every frame count alike. Depends on the motion and on what it is expected to touch, not on
+    where it goes: methods that are given the same features and seed use the same weights.
     """
-    if settings.weighting != "geometric":
-        raise InputError("placement settings", "weighting", settings.weighting, "geometric")
+    if settings.weighting == "uniform":
+        return uniform_weights(motion.n_frames)
     moving = moving_body(motion, body)
-    columns = np.searchsorted(moving.vertex_ids, features.vertex_ids)
-    return geometric_weights(moving.vertices[:, columns], motion.times, features)
+    if settings.weighting == "geometric":
+        columns = np.searchsorted(moving.vertex_ids, features.vertex_ids)
+        return geometric_weights(moving.vertices[:, columns], motion.times, features)
+    if settings.weighting != "paak":
+        wanted = "one of paak, geometric, uniform"
+        raise InputError("placement settings", "weighting", settings.weighting, wanted)
+    inputs = motion_inputs(moving, body, features)
+    values = active_weights(load_network(), inputs, clip_seed(motion, seed))
+    return FrameWeights(values, "paak")
+
+
+def active_weights(
+    network: FrameWeightNetwork, inputs: MotionInputs, seed: int
+) -> Float[np.ndarray, " T"]:
+    """K = lambda_g K_g^ + lambda_b W_d, both of mean 1, scaled to mean 1."""
+    with torch.no_grad():
+        hidden = network.hidden(inputs)
+        scores = network.head(hidden)
+        estimate = np.asarray(network.expectation(scores).double().numpy())
+    spread = diversity(*gradient_factors(scores, hidden), seed)
+    mixed: Float[np.ndarray, " T"] = LAMBDA_G * estimate / estimate.mean() + LAMBDA_B * spread
+    return mixed / mixed.mean()
+
+
+def clip_seed(motion: Motion, seed: int) -> int:
+    """The seed of a motion's diversity score: motions of one set draw independently."""
+    digest = hashlib.sha256(f"{seed} {motion.motion_id}".encode()).digest()
+    return int.from_bytes(digest[:8], "big")
 
 
 def keyframes_only(weights: FrameWeights, share: float) -> FrameWeights:

@@ -5,6 +5,8 @@ PAAK (Mullen et al.) describes such a weight and does not print it; this formula
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter1d
@@ -32,14 +34,44 @@ def geometric_weights(
 
     `vertices` are those of the features, metres, in any fixed frame; `times` seconds.
     """
+    return FrameWeights(frame_cues(vertices, times, features).weights(), "geometric")
+
+
+@dataclass(frozen=True)
+class FrameCues:
+    """What K_g ranks, per frame."""
+
+    speed: Float[np.ndarray, " T"]
+    """Mean vertex speed, m/s, smoothed."""
+    histogram: Float[np.ndarray, "T 42"]
+    """What the frame touches; see `class_histogram`."""
+    strength: Float[np.ndarray, " T"]
+    """Share of the vertices in contact with something other than the floor."""
+
+    def weights(self, part: slice = slice(None)) -> Float[np.ndarray, " t"]:
+        """K_g of the clip, or of a part of it taken as a clip of its own; mean 1."""
+        mix = (
+            EVEN_SHARE
+            + MOTION_SHARE * relative_rank(self.speed[part])
+            + RARITY_SHARE * relative_rank(interaction_rarity(self.histogram[part]))
+            + STRENGTH_SHARE * relative_rank(self.strength[part])
+        )
+        weights: Float[np.ndarray, " t"] = mix / mix.mean()
+        return weights
+
+
+def frame_cues(
+    vertices: Float[np.ndarray, "T V 3"],
+    times: Float[np.ndarray, " T"],
+    features: InteractionFeatures,
+) -> FrameCues:
+    """Speed, classes touched and strength of contact of every frame; arguments as above."""
     contact = features.contact > CONTACT_THRESHOLD
-    mix = (
-        EVEN_SHARE
-        + MOTION_SHARE * relative_rank(motion_speed(vertices, times))
-        + RARITY_SHARE * relative_rank(interaction_rarity(features, contact))
-        + STRENGTH_SHARE * relative_rank(interaction_strength(features, contact))
+    return FrameCues(
+        speed=motion_speed(vertices, times),
+        histogram=class_histogram(features, contact),
+        strength=interaction_strength(features, contact),
     )
-    return FrameWeights(mix / mix.mean(), "geometric")
 
 
 def motion_speed(
@@ -52,11 +84,8 @@ def motion_speed(
     return smooth
 
 
-def interaction_rarity(
-    features: InteractionFeatures, contact: Bool[np.ndarray, "T V"]
-) -> Float[np.ndarray, " T"]:
+def interaction_rarity(histogram: Float[np.ndarray, "T 42"]) -> Float[np.ndarray, " T"]:
     """One minus the mean cosine of a frame's class histogram with all frames' histograms."""
-    histogram = class_histogram(features, contact)
     unit = histogram / np.linalg.norm(histogram, axis=1, keepdims=True)
     rarity: Float[np.ndarray, " T"] = 1.0 - unit @ unit.mean(0)
     return rarity

@@ -47,7 +47,7 @@ def test_weights_are_positive_with_mean_one(seed: int, n_frames: int) -> None:
 def test_a_rare_interaction_is_rarer_than_a_common_one() -> None:
     labels = np.full((10, 3), 2)
     labels[7] = 10
-    rarity = interaction_rarity(features_of(labels), labels > 0)
+    rarity = interaction_rarity(class_histogram(features_of(labels), labels > 0))
     # Nine floor frames and one sofa frame: mean cosines 0.9 and 0.1.
     assert rarity[0] == pytest.approx(0.1, abs=5e-3)
     assert rarity[7] == pytest.approx(0.9, abs=5e-3)
