@@ -84,6 +84,19 @@ class Cutaway:
             hidden |= more
         return hidden
 
+    def hidden_before_room(
+        self, eye: Float[np.ndarray, "3"], box: Float[np.ndarray, "2 3"]
+    ) -> set[str]:
+        """The same where nobody is to be seen: tall things go only with the wall they stand at."""
+        walls = self.hidden_walls(eye)
+        return {
+            group.name
+            for group in self.groups
+            if group.name == "ceiling"
+            or group.wall in walls
+            or (group.is_furniture and self._is_tall_at(group, walls))
+        }
+
     def hidden_walls(self, eye: Float[np.ndarray, "3"]) -> set[str]:
         """Walls whose plane the eye stands behind (or within 10 cm of)."""
         width, depth, _ = self._room_size
@@ -115,6 +128,12 @@ class Cutaway:
         middle = 0.5 * (group.low + group.high)[:2]
         if float((middle - target) @ ahead) > CAMERA_SIDE_M:
             return True
+        return self._is_tall_at(group, walls)
+
+    def _is_tall_at(self, group: Group, walls: set[str]) -> bool:
+        """Over 1.15 m and along one of these walls."""
+        if group.high[2] - self._floor_z <= TALL_M:
+            return False
         width, depth, _ = self._room_size
         gaps = {"n": depth - group.high[1], "s": group.low[1],
                 "e": width - group.high[0], "w": group.low[0]}  # fmt: skip

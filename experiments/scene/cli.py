@@ -67,6 +67,51 @@ def bake(room: str, out: Path | None, as_json: bool) -> None:
     click.echo(json.dumps(record) if as_json else _lines(record))
 
 
+@scene.command()
+@click.argument("room", metavar="NAME|DIR")
+@click.option(
+    "--out", type=click.Path(path_type=Path), required=True, help="The .png or .jpg to write."
+)
+@click.option("--preset", default="720p", show_default=True, help="Name of a render preset.")
+@click.option(
+    "--azimuth",
+    type=click.FloatRange(-360, 360),
+    default=-45.0,
+    show_default=True,
+    help="Where the camera stands, degrees counter-clockwise from east.",
+)
+@click.option(
+    "--elevation",
+    type=click.FloatRange(5, 85),
+    default=38.0,
+    show_default=True,
+    help="How far it looks down, degrees.",
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def picture(
+    room: str, out: Path, preset: str, azimuth: float, elevation: float, as_json: bool
+) -> None:
+    """Draw a room from outside, as clips draw it: no ceiling, no walls on the camera's side."""
+    from experiments.scene.baking import load_room
+    from experiments.scene.stage_parts import stage_parts
+    from renderer.room_picture import room_picture
+    from renderer.settings import preset as settings_named
+    from renderer.video import write_image
+
+    baked, settings = load_room(room), settings_named(preset)
+    image = room_picture(
+        stage_parts(room), baked.room_size, baked.floor_z, azimuth, elevation, settings
+    )
+    write_image(out, image)
+    record = {
+        "scene": baked.scene_id,
+        "picture": str(out),
+        "width": settings.width,
+        "height": settings.height,
+    }
+    click.echo(json.dumps(record) if as_json else _lines(record))
+
+
 def _report(record: dict[str, Any]) -> str:
     """The figures as lines, then the faults."""
     shown = {key: value for key, value in record.items() if key not in ("faults", "overlaps")}
