@@ -16,6 +16,8 @@ import torch
 from jaxtyping import Bool, Float, Integer
 from torch import Tensor
 
+from experiments.placement.batched import batched_terms
+from experiments.placement.engines import engine_of
 from experiments.placement.errors import MotionTooLong, NoAdmissibleStart
 from experiments.placement.objectives import total
 from experiments.placement.problem import Problem, RigidProblem
@@ -84,23 +86,28 @@ def start_grid(problem: Problem) -> Starts:
 
 
 def rank_starts(problem: Problem, starts: Starts) -> Starts:
-    """The share of the starts worth keeping, scored exactly, best first."""
-    coarse = _filtered(problem, starts)
-    keep = max(_LEAST_KEPT, round(problem.settings.keep_share * len(starts)))
-    kept = coarse.take(np.argsort(coarse.score, kind="stable")[:keep])
+    """The share of the starts worth keeping, scored exactly, best first.
+
+    The reference engine keeps and scores all of them.
+    """
+    kept = _admissible(problem, starts)
+    if engine_of(problem.settings).prunes:
+        coarse = coarse_scores(problem, kept)
+        keep = max(_LEAST_KEPT, round(problem.settings.keep_share * len(starts)))
+        kept = kept.take(np.argsort(coarse, kind="stable")[:keep])
     exact = kept.scored(exact_scores(problem, kept))
     return exact.take(np.argsort(exact.score, kind="stable"))
 
 
 def coarse_best(problem: Problem, starts: Starts) -> float:
     """The best coarse score of a start that the filter keeps; raises `NoAdmissibleStart`."""
-    return float(_filtered(problem, starts).score.min())
+    return float(coarse_scores(problem, _admissible(problem, starts)).min())
 
 
-def _filtered(problem: Problem, starts: Starts) -> Starts:
-    """Coarsely scored starts that bring the body to what it expects to touch."""
+def _admissible(problem: Problem, starts: Starts) -> Starts:
+    """Starts that bring the body to what it expects to touch and no bone through anything."""
     threshold = problem.settings.start_filter
-    if threshold is not None:
+    if threshold is not None and not problem.field.semantics_off:
         matching = class_match(problem, starts) >= threshold
         if not matching.any():
             names = ", ".join(problem.expected_classes(floor=True))
@@ -115,7 +122,7 @@ def _filtered(problem: Problem, starts: Starts) -> Starts:
             )
             raise NoAdmissibleStart(problem.motion.motion_id, problem.scene.scene_id, reason)
         starts = starts.take(clear)
-    return starts.scored(coarse_scores(problem, starts))
+    return starts
 
 
 def suppress(starts: Starts, distance: float, angle_deg: float) -> Starts:
@@ -139,7 +146,16 @@ def suppress(starts: Starts, distance: float, angle_deg: float) -> Starts:
 
 def exact_scores(problem: RigidProblem, starts: Starts) -> Float[np.ndarray, " N"]:
     """E_p of the unaltered motion at every start: all frames and all vertices."""
-    return _batched(problem, starts, lambda bodies: total(problem.terms(bodies)))
+    engine = engine_of(problem.settings)
+    if engine.prunes:
+        return _batched(problem, starts, lambda bodies: total(batched_terms(problem, bodies)))
+    yaws = torch.as_tensor(starts.yaw).to(problem.k)
+    translations = torch.as_tensor(starts.translation).to(problem.k)
+    pairs = zip(yaws, translations, strict=True)
+    with torch.no_grad():
+        bodies = (engine.moved(problem, *pair) for pair in pairs)
+        energies = [total(engine.terms(problem, body, 0.0, True)) for body in bodies]
+    return np.array([float(energy) for energy in energies])
 
 
 def coarse_scores(problem: RigidProblem, starts: Starts) -> Float[np.ndarray, " N"]:
@@ -156,7 +172,7 @@ def coarse_scores(problem: RigidProblem, starts: Starts) -> Float[np.ndarray, " 
     share = len(others) / max(len(chosen), 1)
 
     def score(bodies: Float[Tensor, "B T V 3"]) -> Float[Tensor, " B"]:
-        terms = thin.terms(bodies)
+        terms = batched_terms(thin, bodies)
         # Only the penalty is summed over the vertices that were thinned out.
         return total({**terms, "penetration": terms["penetration"] * share})
 
@@ -214,8 +230,8 @@ def _batched(
     scores = np.zeros(len(starts))
     for begin in range(0, len(starts), batch):
         part = slice(begin, begin + batch)
-        yaw = torch.as_tensor(starts.yaw[part], dtype=problem.k.dtype)
-        translation = torch.as_tensor(starts.translation[part], dtype=problem.k.dtype)
+        yaw = torch.as_tensor(starts.yaw[part]).to(problem.k)
+        translation = torch.as_tensor(starts.translation[part]).to(problem.k)
         with torch.no_grad():
             scores[part] = score(problem.moved(yaw, translation)).double().numpy()
     return scores

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -14,7 +15,6 @@ from experiments.body.model import BodyModel
 from experiments.interaction.features import InteractionFeatures
 from experiments.motion.motion import Motion
 from experiments.placement.bones import bone_points
-from experiments.placement.objectives import placement_terms
 from experiments.placement.rigid import clip_centre, clip_floor, move
 from experiments.placement.scene_field import SceneField
 from experiments.placement.settings import PlacementSettings
@@ -39,15 +39,20 @@ class RigidProblem:
     k: Float[Tensor, " T"]
     centre: Float[Tensor, "2"]
 
-    def terms(
-        self, vertices: Float[Tensor, "*B T V 3"], huber: float = 0.0, semantics: bool = True
-    ) -> dict[str, Float[Tensor, "*B"]]:
-        """E_p by terms for bodies in the scene's frame, for any number of starts at once."""
-        distance = self.field.distance(vertices, self.contact)
-        label = self.field.label(vertices.detach(), self.contact) if semantics else None
-        return placement_terms(
-            distance, label, self.contact, self.wanted, self.k, self.settings, huber
-        )
+    @cached_property
+    def touching(self) -> Int64[Tensor, " C"]:
+        """The contact vertices' places in a flattened (T, V) array."""
+        return self.contact.flatten().nonzero().squeeze(1)
+
+    @cached_property
+    def touching_k(self) -> Float[Tensor, " C"]:
+        """k at every contact vertex."""
+        return self.k[self.touching // self.contact.shape[1]]
+
+    @cached_property
+    def touching_wanted(self) -> Int64[Tensor, " C"]:
+        """Predicted class of every contact vertex."""
+        return self.wanted.flatten()[self.touching]
 
     def moved(
         self, yaw: Float[Tensor, "*B"], translation: Float[Tensor, "*B 3"]
@@ -67,7 +72,7 @@ class RigidProblem:
         return RigidProblem(
             settings=self.settings,
             field=self.field,
-            vertices=self.vertices[frame][:, column],
+            vertices=coordinate_major(self.vertices[frame][:, column]),
             contact=self.contact[frame][:, column],
             wanted=self.wanted[frame][:, column],
             k=self.k[frame] * (len(self.k) / len(frames)),
@@ -144,7 +149,7 @@ def build_problem(
         field=SceneField(scene, dtype),
         pose=pose,
         transl=transl,
-        vertices=mesh.vertices.contiguous(),
+        vertices=coordinate_major(mesh.vertices),
         pelvis=pelvis,
         bones=bone_points(mesh.joints),
         contact=contact,
@@ -154,6 +159,11 @@ def build_problem(
         centre=torch.as_tensor(clip_centre(pelvis), dtype=dtype),
         floor=clip_floor(lowest),
     )
+
+
+def coordinate_major(points: Float[Tensor, "T V 3"]) -> Float[Tensor, "T V 3"]:
+    """The same points, all x before all y before all z in memory: `move` then need not copy."""
+    return points.movedim(-1, 0).contiguous().movedim(0, -1)
 
 
 def time_step_scale(times: Float[np.ndarray, " T"]) -> Float[np.ndarray, " T"]:

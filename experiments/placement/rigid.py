@@ -42,18 +42,16 @@ def move(
 
     `yaw` and `translation` may carry one leading axis B of starts; the answer then has it too.
     """
-    shape = (*yaw.shape, *[1] * (points.ndim - 1))
-    cosine, sine = torch.cos(yaw).reshape(shape), torch.sin(yaw).reshape(shape)
-    x, y = points[..., 0] - centre[0], points[..., 1] - centre[1]
-    shift = translation.reshape(*yaw.shape, *[1] * (points.ndim - 1), 3)
-    return torch.stack(
-        [
-            cosine * x - sine * y + centre[0] + shift[..., 0],
-            sine * x + cosine * y + centre[1] + shift[..., 1],
-            points[..., 2] + shift[..., 2],
-        ],
-        dim=-1,
-    )
+    flat = points.movedim(-1, 0).reshape(3, -1)
+    cosine, sine = torch.cos(yaw).flatten(), torch.sin(yaw).flatten()
+    zero, one = torch.zeros_like(cosine), torch.ones_like(cosine)
+    rows = [cosine, -sine, zero, sine, cosine, zero, zero, zero, one]
+    turn = torch.stack(rows).reshape(3, 3, -1).transpose(1, 2)
+    pivot = torch.cat([centre, centre.new_zeros(1)])
+    offset = pivot[:, None] - turn @ pivot + translation.reshape(-1, 3).T
+    # One product for all starts; the answer is a view of coordinate-major memory.
+    placed = torch.addmm(offset.reshape(-1, 1), turn.reshape(-1, 3), flat)
+    return placed.reshape(3, *yaw.shape, *points.shape[:-1]).movedim(0, -1)
 
 
 def move_motion(

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
+from experiments.placement.packed_volumes import PackedVolumes
 from experiments.scene.lookup import SceneLookup
-from experiments.scene.scene import Scene
+from experiments.scene.scene import MPCAT40, N_CLASSES, Scene
+
+_NO_CLASS = (MPCAT40.index("void"), MPCAT40.index("unlabeled"))
 
 
 class SceneField:
@@ -17,32 +21,51 @@ class SceneField:
     all others read the thickened one, in which thin boards register.
     """
 
-    def __init__(self, scene: Scene, dtype: torch.dtype = torch.float32) -> None:
-        self._thick = SceneLookup(scene, thickened=True, dtype=dtype)
-        self._plain = SceneLookup(scene, thickened=False, dtype=dtype)
+    def __init__(
+        self,
+        scene: Scene,
+        dtype: torch.dtype = torch.float32,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        self.thick = SceneLookup(scene, thickened=True, dtype=dtype, device=device)
+        self.plain = SceneLookup(scene, thickened=False, dtype=dtype, device=device)
+        self.packed = PackedVolumes(self.plain, self.thick)
+        self.semantics_off = semantics_off(scene)
+        """Why classes cannot be compared in this scene; empty if they can."""
 
     def distance(
         self, points: Float[Tensor, "*B T V 3"], contact: Bool[Tensor, "T V"]
     ) -> Float[Tensor, "*B T V"]:
         """Signed distance in metres, negative inside solids; points in the scene's frame."""
-        distance = self._thick.distance(points)
+        distance = self.thick.distance(points)
         ever = contact.any(0)
         if not ever.any():
             return distance
-        plain = self._plain.distance(points[..., ever, :])
+        plain = self.plain.distance(points[..., ever, :])
         # Only the columns that are ever in contact are read twice.
         column = torch.cumsum(ever, 0).sub(1).clamp(min=0)
         return torch.where(contact, plain[..., column], distance)
 
     def clearance(self, points: Float[Tensor, "*B T M 3"]) -> Float[Tensor, "*B T"]:
         """Least distance to the true surface over some points of a frame, metres."""
-        return self._plain.distance(points).amin(-1)
+        return self.plain.distance(points).amin(-1)
 
     def label(
         self, points: Float[Tensor, "*B T V 3"], contact: Bool[Tensor, "T V"]
     ) -> Int64[Tensor, "*B T V"]:
         """Class of the nearest surface (mpcat40 index) where a vertex is ever in contact, else 0."""
         ever = contact.any(0)
-        label = torch.zeros(points.shape[:-1], dtype=torch.int64)
-        label[..., ever] = self._plain.label(points[..., ever, :])
+        label = torch.zeros(points.shape[:-1], dtype=torch.int64, device=points.device)
+        label[..., ever] = self.plain.label(points[..., ever, :])
         return label
+
+
+def semantics_off(scene: Scene) -> str:
+    """Why the classes of a scene cannot be compared with expected ones; empty if they can."""
+    present = np.unique(scene.volumes.label)
+    if np.isin(present, _NO_CLASS).all():
+        return "the scene has no labels"
+    unknown = present[present >= N_CLASSES].tolist()
+    if unknown:
+        return f"the scene has classes outside mpcat40 ({', '.join(map(str, unknown))})"
+    return ""

@@ -11,10 +11,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from experiments.placement.engines import engine_of
 from experiments.placement.objectives import alteration_terms, total
 from experiments.placement.optimiser import Energy, Minimum, minimise
 from experiments.placement.problem import Problem
-from experiments.placement.rigid import move
 from experiments.placement.settings import PlacementSettings
 from experiments.placement.steadiness import Steadiness
 from experiments.placement.whitening import alteration_basis
@@ -49,14 +49,15 @@ class Fit:
 
 def fit_rigid(problem: Problem, yaw: float, translation: Float[np.ndarray, "3"]) -> Fit:
     """Minimise E_p over yaw and translation; the motion keeps its shape."""
+    engine = engine_of(problem.settings)
     origin, scale = _rigid_state(problem, yaw, translation)
 
     def bodies(state: Float[Tensor, " N"]) -> Float[Tensor, "T V 3"]:
         rigid = origin + scale * state
-        return problem.moved(rigid[0], rigid[1:])
+        return engine.moved(problem, rigid[0], rigid[1:])
 
     def energy(huber: float) -> Energy:
-        return lambda state: total(problem.terms(bodies(state), huber, semantics=False))
+        return lambda state: total(engine.terms(problem, bodies(state), huber, False))
 
     def fit(rigid: Float[Tensor, "4"]) -> Fit:
         return _fit(problem, rigid, _unaltered(problem), problem.settings)
@@ -80,6 +81,7 @@ def fit_altered(
     method, so that a variant differs in its energy alone.
     """
     weights = energy_settings or problem.settings
+    engine = engine_of(problem.settings)
     variables = _Variables(problem, rigid)
     steadiness = Steadiness(problem, weights)
 
@@ -87,7 +89,7 @@ def fit_altered(
         def value(state: Float[Tensor, " N"]) -> Float[Tensor, ""]:
             placed, delta, shift = variables.decode(state)
             bodies = altered_bodies(problem, placed, delta, shift)
-            terms = problem.terms(bodies, huber, semantics=False)
+            terms = engine.terms(problem, bodies, huber, False)
             costs = alteration_terms(delta, shift, problem.k, problem.step_scale, weights)
             extra = steadiness.terms(bodies, placed, delta, shift)
             return total({**terms, **costs, **extra})
@@ -108,8 +110,7 @@ def altered_bodies(
     shift: Float[Tensor, "T 3"],
 ) -> Float[Tensor, "T V 3"]:
     """The vertices of the energy for an altered motion, in the scene's frame."""
-    mesh = problem.body.posed(problem.pose + delta, problem.transl + shift, problem.vertex_ids)
-    return move(mesh.vertices, placed[0], placed[1:], problem.centre)
+    return engine_of(problem.settings).bodies(problem, placed, delta, shift)
 
 
 class _Variables:
@@ -193,7 +194,7 @@ def _fit(
     delta, shift = (part.detach() for part in alteration)
     with torch.no_grad():
         bodies = altered_bodies(problem, placed, delta, shift)
-        terms = problem.terms(bodies)
+        terms = engine_of(problem.settings).terms(problem, bodies, 0.0, True)
         costs = alteration_terms(delta, shift, problem.k, problem.step_scale, weights)
         extra = Steadiness(problem, weights).terms(bodies, placed, delta, shift)
     named = {name: float(value) for name, value in {**terms, **costs, **extra}.items()}

@@ -31,22 +31,29 @@ class SceneLookup:
         self.scene_id = scene.scene_id
         self.thickened = thickened
         self.cell = volumes.cell
-        self._sdf = torch.as_tensor(np.ascontiguousarray(grid), dtype=dtype, device=device)
-        self._label = torch.as_tensor(np.ascontiguousarray(volumes.label), device=device)
-        self._origin = torch.tensor(volumes.origin, dtype=dtype, device=device)
+        # Float[Tensor, "X Y Z"], UInt8[Tensor, "X Y Z"] and metres of node (0, 0, 0).
+        self.sdf = torch.as_tensor(np.ascontiguousarray(grid), dtype=dtype, device=device)
+        self.labels = torch.as_tensor(np.ascontiguousarray(volumes.label), device=device)
+        self.origin = torch.tensor(volumes.origin, dtype=dtype, device=device)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number of nodes along x, y and z."""
+        x, y, z = self.sdf.shape
+        return x, y, z
 
     def distance(self, points: Float[Tensor, "... 3"]) -> Float[Tensor, "..."]:
         """Signed distance in metres, differentiable in `points`; see `trilinear`."""
-        return trilinear(self._sdf, self._origin, self.cell, points)
+        return trilinear(self.sdf, self.origin, self.cell, points)
 
     def label(self, points: Float[Tensor, "... 3"]) -> Int64[Tensor, "..."]:
         """mpcat40 class index of the nearest surface; see `nearest`."""
-        return nearest(self._label, self._origin, self.cell, points).to(torch.int64)
+        return nearest(self.labels, self.origin, self.cell, points).to(torch.int64)
 
     def bounds(self) -> tuple[Float[Tensor, "3"], Float[Tensor, "3"]]:
         """First and last node of the grid, metres: where distances are more than clamped values."""
-        steps = torch.tensor(self._sdf.shape, device=self._sdf.device) - 1
-        return self._origin, self._origin + self.cell * steps
+        steps = torch.tensor(self.sdf.shape, device=self.sdf.device) - 1
+        return self.origin, self.origin + self.cell * steps
 
 
 def trilinear(

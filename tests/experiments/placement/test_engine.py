@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from experiments.placement.batched import batched_terms
 from experiments.placement.candidates import Starts, exact_scores
 from experiments.placement.objectives import alteration_terms, total
 from experiments.placement.pointwise import pointwise_scores, pointwise_terms
@@ -28,7 +29,7 @@ def test_the_fast_engine_equals_the_slow_one(make_problem, state, tolerance, tim
     slow = pointwise_terms(problem, yaw, translation, delta, shift)
     placed = torch.tensor([yaw, *translation], dtype=torch.float64)
     parts = torch.as_tensor(delta), torch.as_tensor(shift)
-    fast = problem.terms(altered_bodies(problem, placed, *parts))
+    fast = batched_terms(problem, altered_bodies(problem, placed, *parts))
     fast |= alteration_terms(*parts, problem.k, problem.step_scale, problem.settings)
     assert {name: float(value) for name, value in fast.items()} == pytest.approx(slow, rel=1e-9)
     assert min(slow.values()) > 0
@@ -56,7 +57,7 @@ def test_the_whole_energy_has_the_gradient_of_its_formula(make_problem, state) -
         parts = torch.as_tensor(delta[:4]), torch.as_tensor(shift[:4])
         turned = parts[0] + offset[4:268].reshape(4, 22, 3), parts[1] + offset[268:].reshape(4, 3)
         bodies = altered_bodies(problem, placed + offset[:4], *turned)
-        terms = problem.terms(bodies, huber=0.003, semantics=False)
+        terms = batched_terms(problem, bodies, huber=0.003, semantics=False)
         costs = alteration_terms(*turned, problem.k, problem.step_scale, problem.settings)
         return total({**terms, **costs})
 
