@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 import torch
@@ -179,7 +181,7 @@ def test_spirals_walk_the_first_ring_then_the_second(reference) -> None:
         first = spiral[1 : 1 + min(len(ring), 8)].tolist()
         assert set(first) <= ring and len(set(first)) == len(first)
         # One walks around the vertex: each neighbour touches the one before.
-        assert all(b in neighbours[a] for a, b in zip(first, first[1:], strict=False))
+        assert all(b in neighbours[a] for a, b in itertools.pairwise(first))
         second = set(spiral[1 + len(ring) :].tolist())
         assert second <= set().union(*(neighbours[near] for near in ring)) - ring - {vertex}
 

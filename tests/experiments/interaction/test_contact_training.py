@@ -192,7 +192,7 @@ def test_damaged_or_foreign_weights_are_refused_by_name(note, tmp_path) -> None:
     with pytest.raises(InputError, match="file: got 'missing'"):
         load_weights(tmp_path / "absent.safetensors")
     target.write_bytes(b"\x80\x04cos\nsystem\n(S'true'\ntR.")
-    with pytest.raises(InputError, match="content: .* wanted a readable safetensors file"):
+    with pytest.raises(InputError, match=r"content: .* wanted a readable safetensors file"):
         load_weights(target)
 
 
