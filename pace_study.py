@@ -25,6 +25,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "evaluate": ("experiments.cli:evaluate", "Place and score methods without rendering."),
     "train": ("experiments.train_cli:train", "Train the networks that the project ships."),
     "render": ("experiments.cli:render", "Render one placement into a clip."),
+    "view": ("experiments.view_cli:view", "Write a page that shows placements in 3D."),
     "study": ("study_app.cli:study", "Create, open, watch, close and export studies."),
     "serve": ("study_app.cli:serve", "Serve studies to participants."),
     "simulate": ("study_app.cli:simulate", "Let simulated participants answer over HTTP."),

@@ -1,0 +1,121 @@
+// The room: its glTF as meshes, grouped so that walls and tall furniture can leave the view.
+import {
+  Box3, BufferAttribute, BufferGeometry, Group, Mesh, MeshLambertMaterial, Ray, RepeatWrapping, SRGBColorSpace,
+  Texture, Vector3,
+} from "three";
+
+export const WALL_MODES = ["cutaway", "xray", "solid"];
+const XRAY_OPACITY = 0.16;
+const ROUND_EYE = 0.1; // metres: a wall this close to the eye counts as in front of the room
+
+export class Room {
+  static async read(glb, manifest) {
+    const textures = await Promise.all((glb.json.images ?? []).map((_, index) => readTexture(glb.image(index))));
+    return new Room(glb, manifest, textures);
+  }
+
+  constructor(glb, manifest, textures) {
+    this.size = manifest.room_size;
+    this.group = new Group();
+    this.groups = [];
+    this.mode = "cutaway";
+    const solid = glb.json.materials.map((material) => roomMaterial(material, textures));
+    const xray = solid.map((material) => seeThrough(material));
+    for (const index of glb.json.nodes[0].children) {
+      const node = glb.json.nodes[index];
+      const group = new Group();
+      group.name = node.name;
+      for (const child of node.children) {
+        const part = glb.json.nodes[child];
+        const primitive = glb.json.meshes[part.mesh].primitives[0];
+        const mesh = new Mesh(readGeometry(glb, primitive), solid[primitive.material]);
+        mesh.name = part.name;
+        mesh.userData = { solid: solid[primitive.material], xray: xray[primitive.material] };
+        mesh.castShadow = !manifest.light.no_shadow_from.includes(node.name);
+        mesh.receiveShadow = true;
+        group.add(mesh);
+      }
+      group.userData = { wall: node.extras.wall, tall: node.name.startsWith("object:"), box: new Box3().setFromObject(group) };
+      this.groups.push(group);
+      this.group.add(group);
+    }
+  }
+
+  /** Show, fade or hide the groups for this eye; `body` is the box of the shown body. */
+  update(eye, body) {
+    const shut = this.#wallsInFront(eye);
+    for (const group of this.groups) {
+      const { wall, tall, box } = group.userData;
+      const isFloor = group.name === "floor";
+      const inFront = wall !== null && shut.has(wall);
+      group.visible = this.mode === "solid" || !inFront;
+      const fades = this.mode === "xray" ? !isFloor : this.mode === "cutaway" && tall && hides(eye, body, box);
+      const kind = fades ? "xray" : "solid";
+      for (const mesh of group.children) mesh.material = mesh.userData[kind];
+    }
+  }
+
+  #wallsInFront(eye) {
+    const [width, depth] = this.size;
+    const beyond = { n: eye.y - depth, s: -eye.y, e: eye.x - width, w: -eye.x };
+    return new Set(Object.keys(beyond).filter((wall) => beyond[wall] > -ROUND_EYE));
+  }
+}
+
+/** Whether a box stands between the eye and the body and is not itself what the body touches. */
+function hides(eye, body, box) {
+  if (body.isEmpty() || box.intersectsBox(body)) return false;
+  const middle = body.getCenter(new Vector3());
+  return [body.min.z, middle.z, body.max.z].some((z) => {
+    const target = new Vector3(middle.x, middle.y, z);
+    const ray = new Ray(eye, target.clone().sub(eye).normalize());
+    const hit = ray.intersectBox(box, new Vector3());
+    return hit !== null && hit.distanceTo(eye) < target.distanceTo(eye);
+  });
+}
+
+async function readTexture(blob) {
+  const texture = new Texture(await createImageBitmap(blob));
+  texture.flipY = false; // glTF images start at the top
+  texture.wrapS = texture.wrapT = RepeatWrapping;
+  texture.colorSpace = SRGBColorSpace;
+  texture.anisotropy = 8;
+  texture.needsUpdate = true;
+  return texture;
+}
+
+function readGeometry(glb, primitive) {
+  const names = { POSITION: "position", NORMAL: "normal", COLOR_0: "color", TEXCOORD_0: "uv", _OCCLUSION: "occlusion" };
+  const geometry = new BufferGeometry();
+  for (const [name, index] of Object.entries(primitive.attributes)) {
+    const { array, width, normalized } = glb.accessor(index);
+    geometry.setAttribute(names[name], new BufferAttribute(array, width, normalized));
+  }
+  geometry.setIndex(new BufferAttribute(glb.accessor(primitive.indices).array, 1));
+  return geometry;
+}
+
+function roomMaterial(described, textures) {
+  const image = described.pbrMetallicRoughness.baseColorTexture;
+  const map = image ? textures[image.index] : null;
+  return occluded(new MeshLambertMaterial({ vertexColors: true, map }));
+}
+
+function seeThrough(material) {
+  const faded = occluded(material.clone());
+  Object.assign(faded, { transparent: true, opacity: XRAY_OPACITY, depthWrite: false });
+  return faded;
+}
+
+/** Baked occlusion dims the light that comes from everywhere, not the lamp's. */
+function occluded(material) {
+  material.onBeforeCompile = (shader) => {
+    shader.vertexShader = shader.vertexShader
+      .replace("#include <common>", "#include <common>\nattribute float occlusion;\nvarying float vOpen;")
+      .replace("#include <begin_vertex>", "#include <begin_vertex>\nvOpen = occlusion;");
+    shader.fragmentShader = shader.fragmentShader
+      .replace("#include <common>", "#include <common>\nvarying float vOpen;")
+      .replace("#include <aomap_fragment>", "reflectedLight.indirectDiffuse *= vOpen;");
+  };
+  return material;
+}
