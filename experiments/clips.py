@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ from experiments.records import SetFolder
 from experiments.scene.baking import load_room
 from experiments.scene.stage_parts import stage_parts
 from renderer.cameras import CameraRig, choose_cameras
-from renderer.files import read_json, write_json
+from renderer.files import file_sha256, read_json, write_json
 from renderer.render import RenderedClip, render_clip
 from renderer.settings import RenderSettings, preset
 from renderer.stage import Stage
@@ -72,8 +73,9 @@ def render_job(job: RenderJob) -> None:
                 parts, scene.room_size, take.vertices, body.faces, settings.fps, scene.floor_z,
                 regions=body.regions,
             )  # fmt: skip
-            clips.append(_render_take(job, take, stage, rig, settings))
+            clips.append(_finished(job, take) or _render_take(job, take, stage, rig, settings))
     write_json(job.record_path, {"input_hash": job.input_hash(), "clips": clips, "cameras": rigs})
+    shutil.rmtree(job.record_path.with_suffix(""), ignore_errors=True)
 
 
 def render_settings(job: RenderJob) -> RenderSettings:
@@ -118,6 +120,18 @@ def _take(
     return Take(role, method, skinned(body, motion), scores, f"placements/{stem.name}.json")
 
 
+def _finished(job: RenderJob, take: Take) -> dict[str, Any] | None:
+    """The record of a clip that an earlier, interrupted run of this job made, if it is whole."""
+    path = job.clip_path(take.role, take.method)
+    if not path.exists():
+        return None
+    note = read_json(path)
+    clip: dict[str, Any] = note["clip"]
+    video, poster = job.folder / clip["file"], job.folder / clip["poster"]
+    whole = video.exists() and poster.exists() and file_sha256(video) == clip["sha256"]
+    return clip if whole and note["input_hash"] == job.input_hash() else None
+
+
 def _render_take(
     job: RenderJob, take: Take, stage: Stage, rig: CameraRig, settings: RenderSettings
 ) -> dict[str, Any]:
@@ -129,7 +143,10 @@ def _render_take(
         clip_id = rendered.sha256[:16]
         video.replace(clips / f"{clip_id}.mp4")
         poster.replace(clips / f"{clip_id}.jpg")
-    return _clip_record(job, take, clip_id, rig, settings, rendered)
+    record = _clip_record(job, take, clip_id, rig, settings, rendered)
+    note = {"input_hash": job.input_hash(), "clip": record}
+    write_json(job.clip_path(take.role, take.method), note)
+    return record
 
 
 def _clip_record(

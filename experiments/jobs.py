@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,6 +89,10 @@ class RenderJob:
         name = f"{self.role}{self.extra}" if self.role == "practice" else self.role
         return SetFolder(self.folder).clip_record_path(self.scene, self.motion_id, name)
 
+    def clip_path(self, role: str, method: str) -> Path:
+        """Where a single finished clip is noted until all clips of the job are."""
+        return self.record_path.with_suffix("") / f"{role}__{method}.json"
+
     def input_hash(self) -> str:
         """What the clips depend on: the placements' bytes and every render setting."""
         folder = SetFolder(self.folder)
@@ -130,6 +135,7 @@ def run_place(job: PlaceJob) -> str:
     """Place and score; a method that finds no place leaves a record with the reason."""
     _one_thread()
     from experiments.methods import METHODS
+    from experiments.motion_class import motion_class
     from experiments.placement.errors import PlacementError
     from experiments.placement.placement import write_placement
     from experiments.placement.settings import PRESETS
@@ -145,6 +151,9 @@ def run_place(job: PlaceJob) -> str:
         "input_hash": job.input_hash(),
         "failure": "",
         "scores": {},
+        "motion_class": motion_class(motion, body),
+        "n_frames": motion.n_frames,
+        "sdf_cell_m": scene.volumes.cell,
     }
     try:
         settings = PRESETS[job.config.placement.preset]
@@ -176,7 +185,6 @@ def load_inputs(
     from experiments.body.embedded import load_body
     from experiments.motion.library import load_motion, trim
     from experiments.motion.motion import read_motion
-    from experiments.scene.baking import load_room
 
     if config.motions_dir and not is_extra:
         motion = read_motion(Path(config.motions_dir) / f"{motion_id}.npz")
@@ -184,7 +192,15 @@ def load_inputs(
         motion = load_motion(motion_id, config.body)
     seconds = config.extras.seconds if is_extra else config.cut_seconds
     motion = trim(motion, seconds) if seconds else motion
-    return load_room(scene_name), load_body(config.body), motion
+    return _room(scene_name), load_body(config.body), motion
+
+
+@lru_cache(maxsize=2)
+def _room(name: str) -> Scene:
+    # One object for all jobs of a room: what was found out about it is then found again.
+    from experiments.scene.baking import load_room
+
+    return load_room(name)
 
 
 def run_render(job: RenderJob) -> str:

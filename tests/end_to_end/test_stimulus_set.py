@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -78,6 +81,38 @@ def test_a_second_build_changes_no_byte(built: BuildOutcome, config_file: Path) 
     again = build_set(read_config(config_file), built.folder, jobs=2)
     assert again.reused == 2
     assert {path: path.read_bytes() for path in built.folder.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.slow
+def test_a_build_killed_in_mid_clip_goes_on_clip_by_clip_to_the_same_set(
+    built: BuildOutcome, config_file: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "killed"
+    folder.mkdir()
+    for name in ("config.json", "placements", "records"):
+        copy = shutil.copytree if (built.folder / name).is_dir() else shutil.copy
+        copy(built.folder / name, folder / name)
+    shutil.rmtree(folder / "records" / "clips")
+    command = [sys.executable, "-m", "pace_study", "stimuli", "build", str(config_file)]
+    command += ["--out", str(folder), "--jobs", "1"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(command, env=environment, start_new_session=True) as run:
+        notes = folder / "records" / "clips" / "main__bedroom__walk_turn_right"
+        _wait_for(lambda: any(notes.glob("*.json")) and any(folder.glob("clips/.partial-*")))
+        os.killpg(run.pid, signal.SIGKILL)
+    done = {path: path.stat().st_mtime_ns for path in (folder / "clips").glob("*.mp4")}
+    assert 0 < len(done) < 6 and not (folder / "catalogue.json").exists()
+    build_set(read_config(config_file), folder, jobs=1)
+    assert {path: path.stat().st_mtime_ns for path in done} == done
+    assert read_catalogue(folder).clips == read_catalogue(built.folder).clips
+    assert verify_catalogue(folder) == [] and not any(folder.glob("clips/.partial-*"))
+
+
+def _wait_for(condition: Callable[[], bool], seconds: float = 240.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "the build made no clip in time"
+        time.sleep(0.05)
 
 
 def _verify(folder: Path) -> subprocess.CompletedProcess[str]:
