@@ -12,13 +12,15 @@ from scipy.spatial.transform import Rotation
 from experiments.body.model import BodyModel
 from experiments.motion.motion import Motion
 
+STILL_MM = 0.01
+"""Mean joint jerk, mm per frame³, below which a clip is still and a ratio says nothing."""
 STANCE_HEIGHT_M = 0.015
 """Sole vertices lower than this above the lowest of the clip stand on the ground."""
 
 
 @dataclass(frozen=True)
 class AlterationCost:
-    """Comparison of a placed motion with the motion it was made from; all zero for a rigid method."""
+    """Comparison of a placed motion with the motion it was made from; no cost for a rigid method."""
 
     angle_mean_deg: float
     """Mean change of a joint's rotation over frames and joints, degrees; the root's turn included."""
@@ -30,6 +32,8 @@ class AlterationCost:
     """Largest change of a frame-to-frame step of the root, mm."""
     jerk_change_mm: float
     """Mean joint jerk after minus before, mm per frame³."""
+    jerk_ratio: float
+    """Mean joint jerk after over before; nan for a clip that is still to begin with."""
     foot_skate_cm_s: float
     """Mean horizontal speed of sole vertices on the ground after, cm/s."""
     foot_skate_before_cm_s: float
@@ -43,12 +47,14 @@ def alteration_cost(placed: Motion, original: Motion, body: BodyModel) -> Altera
     expected = turn.apply(original.transl + body.rest_joints[0]) + shift
     residual = placed.transl + body.rest_joints[0] - expected
     steps = np.linalg.norm(np.diff(residual, axis=0), axis=-1)
+    jerk, jerk_before = joint_jerk(placed, body), joint_jerk(original, body)
     return AlterationCost(
         angle_mean_deg=float(angles.mean()),
         angle_max_deg=float(angles.max()),
         root_shift_mean_cm=float(100 * np.linalg.norm(residual, axis=-1).mean()),
         step_change_max_mm=float(1000 * steps.max()),
-        jerk_change_mm=joint_jerk(placed, body) - joint_jerk(original, body),
+        jerk_change_mm=jerk - jerk_before,
+        jerk_ratio=jerk / jerk_before if jerk_before > STILL_MM else float("nan"),
         foot_skate_cm_s=foot_skate(placed, body),
         foot_skate_before_cm_s=foot_skate(original, body),
     )

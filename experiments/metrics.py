@@ -28,6 +28,8 @@ TOLERANCES_M = {"contact_5mm": 0.005, "contact_1cm": 0.01, "contact_2cm": 0.02}
 """Distances below which a vertex counts as touching, beside the strict zero."""
 NEAR_M = 0.02
 """A predicted contact vertex this close to the scene is fulfilled (cv2)."""
+DEEP_M = 0.01
+"""A vertex deeper than this is inside by more than the volumes' own error."""
 _FLOOR = 2
 
 
@@ -47,6 +49,8 @@ class PlausibilityScores:
     """Summed depth of all vertices inside something, metres, per frame."""
     depth_max: Float[np.ndarray, " T"]
     """Depth of the deepest vertex, metres, per frame."""
+    deep: Float[np.ndarray, " T"]
+    """Share of the skin's vertices deeper than `DEEP_M` inside something, per frame."""
     predicted_near: float
     """cv2: share of the predicted contact vertices within 2 cm of the scene; nan without any."""
     semantic_match: float
@@ -67,6 +71,7 @@ class PlausibilityScores:
             "frames_with_prediction": self.frames_with_prediction,
             "depth_sum_m": float(self.depth_sum.mean()),
             "depth_max_m": float(self.depth_max.max()),
+            "deeper_1cm": float(self.deep.mean()),
             **dataclasses.asdict(self.alteration),
         }
         return {name: value for name, value in scores.items() if np.isfinite(value)}
@@ -89,6 +94,7 @@ def plausibility(
         contact_beyond_floor=_any_below(np.where(label == _FLOOR, np.inf, distance), 0.01),
         depth_sum=np.maximum(-distance, 0.0).sum(1),
         depth_max=np.maximum(-distance, 0.0).max(1),
+        deep=(distance < -DEEP_M).mean(1),
         alteration=alteration_cost(placed, original, body),
         **predicted,
     )

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import dataclass, field
+from functools import lru_cache
+
 from experiments.body.model import BodyModel
 from experiments.interaction.features import InteractionFeatures
 from experiments.interaction.registry import INTERACTIONS, first_fitting_map
@@ -21,11 +25,34 @@ def choose_features(
 
     `posa`: the first whose most common class exists in the scene. `search` (ours): the one whose
     best start is best at uniform weights, whatever the method, so that all methods are asked for
-    the same contacts. Raises `PlacementError` where no map has a start.
+    the same contacts. Raises `PlacementError` where no map has a start. The last answers are
+    remembered: all methods, and the scores of each, ask for the same map.
     """
     if settings.interaction not in INTERACTIONS:
         wanted = "one of " + ", ".join(INTERACTIONS)
         raise InputError("placement settings", "interaction", settings.interaction, wanted)
+    arrays = (motion.pose, motion.transl, motion.times)
+    digest = hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
+    model = id(INTERACTIONS[settings.interaction])
+    key = (digest, motion.motion_id, id(scene), id(body), model, settings.config_hash())
+    return _chosen(_Question(key, motion, scene, body, settings))
+
+
+@dataclass(frozen=True)
+class _Question:
+    """Arguments of `choose_features`, equal if their key is; holds them, so that ids stay taken."""
+
+    key: tuple[str | int, ...]
+    motion: Motion = field(compare=False)
+    scene: Scene = field(compare=False)
+    body: BodyModel = field(compare=False)
+    settings: PlacementSettings = field(compare=False)
+
+
+@lru_cache(maxsize=2)
+def _chosen(question: _Question) -> InteractionFeatures:
+    motion, scene = question.motion, question.scene
+    body, settings = question.body, question.settings
     maps = INTERACTIONS[settings.interaction](motion, body, scene.class_names())
     if settings.feature_choice == "posa":
         return maps[first_fitting_map(maps, scene)]

@@ -50,6 +50,19 @@ def test_a_sunk_body_scores_the_share_of_vertices_above_the_floor(
     assert scores.depth_max == pytest.approx(-heights.min(1), abs=1e-4)
 
 
+@pytest.mark.parametrize("sink", [0.0, 0.012, 0.05])
+def test_vertices_deeper_than_a_centimetre_are_counted_by_their_height(
+    stander, slim, empty_room, sink: float
+) -> None:
+    original, placed = stander
+    sunk = lifted(placed, -sink)
+    scores = plausibility(sunk, original, empty_room, slim, FAST)
+    expected = (skin_heights(sunk, slim) < -0.01).mean(1)
+    assert scores.deep == pytest.approx(expected, abs=2e-4)
+    assert (scores.deep <= 1.0 - scores.non_collision).all()
+    assert scores.as_dict()["deeper_1cm"] == pytest.approx(float(expected.mean()), abs=2e-4)
+
+
 def skin_heights(motion, body) -> np.ndarray:
     import torch
 
@@ -99,7 +112,18 @@ def test_a_rigid_move_costs_the_motion_nothing(sit, slim) -> None:
     cost = dataclasses.asdict(alteration_cost(moved, motion, slim))
     skate = cost.pop("foot_skate_cm_s"), cost.pop("foot_skate_before_cm_s")
     assert skate[0] == pytest.approx(skate[1], abs=1e-6)
+    assert cost.pop("jerk_ratio") == pytest.approx(1.0)
     assert max(abs(value) for value in cost.values()) < 1e-5
+
+
+def test_twice_the_movement_has_twice_the_jerk_and_a_still_clip_has_no_ratio(sit, slim) -> None:
+    still = sit(30, stand=1.0)
+    path = 0.05 * np.sin(np.arange(30))[:, None] * np.array([1.0, 0.0, 0.0])
+    once, twice = (
+        dataclasses.replace(still, transl=still.transl + times * path) for times in (1, 2)
+    )
+    assert alteration_cost(twice, once, slim).jerk_ratio == pytest.approx(2.0)
+    assert np.isnan(alteration_cost(once, still, slim).jerk_ratio)
 
 
 def test_the_rigid_part_between_two_motions_is_recovered(sit, slim) -> None:
