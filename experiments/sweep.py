@@ -21,8 +21,8 @@ from renderer.files import InputError, atomic_path
 CASES: tuple[tuple[str, str], ...] = (
     ("walk_turn_right", "office"),
     ("sit_stay_stand", "office"),
-    ("walk_turn_right", "dining"),
     ("sit_stay_stand", "dining"),
+    ("lean_table", "dining"),
 )
 """(motion, training room)."""
 SECONDS = 4.0
@@ -48,12 +48,12 @@ SWEEPS: dict[str, tuple[Setting, ...]] = {
         _weights(1.6, 10, 0.5),
     ),
     "plus": (
-        ("none of the three", "pace", {}),
+        ("none (PACE)", "pace", {}),
         ("3 mm rule", "pace", {"contact_tolerance": 0.003}),
         *(
             (f"3 mm rule, slide {slide:g}, bend {bend:g}", "pace",
              {"contact_tolerance": 0.003, "slide_weight": slide, "bend_weight": bend})
-            for slide, bend in ((0, 100), (500, 0), (100, 100), (500, 100), (2000, 100), (500, 1000))
+            for slide, bend in ((0, 300), (5000, 0), (500, 300), (2000, 300), (5000, 300), (5000, 1000))
         ),
     ),
     "collapse": tuple(

@@ -22,8 +22,8 @@ from experiments.placement.settings import PlacementSettings
 from experiments.scene.scene import Scene
 
 CONTACT_TOLERANCE_M = 0.003
-SLIDE_WEIGHT = 500.0
-BEND_WEIGHT = 100.0
+SLIDE_WEIGHT = 5000.0
+BEND_WEIGHT = 300.0
 
 
 def posa_t_plus(

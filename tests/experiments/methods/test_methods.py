@@ -23,13 +23,6 @@ from renderer.files import InputError
 FAST = PRESETS["fast"]
 
 
-@pytest.fixture(scope="module")
-def placed(sit, slim, seat_room):
-    motion = sit(45, stand=0.3)
-    place = {name: METHODS[name].place(motion, seat_room, slim, FAST, 1) for name in METHODS}
-    return motion, place
-
-
 def test_every_method_puts_the_sitter_on_the_seat(placed, slim, seat_room) -> None:
     motion, placements = placed
     for placement in placements.values():
