@@ -30,16 +30,17 @@ def batched_terms(
     touching = _touching(problem, points.shape[1])
     inside = _inside(problem, points.detach())
     read = torch.cat([touching, inside])
-    first = torch.zeros_like(read)
+    first = torch.zeros_like(read, dtype=torch.int32)
     first[len(touching) :] = volumes.thick_from
     gap, depth = volumes.distance(points, read, first).split([len(touching), len(inside)])
 
-    gap, k = gap.reshape(-1, len(problem.touching)), problem.touching_k
-    n_vertices = problem.contact.shape[1]
-    per_frame = gap.new_zeros(points.shape[1] // n_vertices).index_add(
+    n_frames, n_vertices = problem.contact.shape
+    n_starts, k = points.shape[1] // problem.contact.numel(), problem.touching_k
+    gap = gap.reshape(n_starts, len(k))
+    per_frame = gap.new_zeros(n_starts * n_frames).index_add(
         0, inside // n_vertices, smoothed_depth(-depth, huber)
     )
-    penetration = per_frame.reshape(-1, len(problem.k)) @ problem.k
+    penetration = per_frame.reshape(n_starts, n_frames) @ problem.k
     if settings.contact_tolerance is not None:
         penetration = penetration + smoothed_depth(-gap - settings.contact_tolerance, huber) @ k
     terms = {

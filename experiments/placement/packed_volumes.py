@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 import torch
-from jaxtyping import Bool, Float, Int64, UInt8
+from jaxtyping import Bool, Float, Int64, Integer, UInt8
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
@@ -24,14 +24,20 @@ class PackedVolumes:
         self.shape = plain.shape
         self.cell = plain.cell
         self.origin = plain.origin
+        self._before = -self.origin / self.cell
         self.distances: Float[Tensor, " 2N"] = torch.stack([plain.sdf, thick.sdf]).flatten()
         self.label: UInt8[Tensor, " N"] = plain.labels.flatten()
         self.solid: Bool[Tensor, " N"] = cells_with_inside(thick.sdf).flatten()
         self.thick_from = math.prod(self.shape)
         """Where the thickened distances begin in `distances`."""
+        # Half the memory to move where it suffices: every vertex takes part in finding its cell.
+        self._index = torch.int32 if 2 * self.thick_from < 2**31 else torch.int64
 
     def distance(
-        self, points: Float[Tensor, "3 P"], columns: Int64[Tensor, " M"], first: Int64[Tensor, " M"]
+        self,
+        points: Float[Tensor, "3 P"],
+        columns: Int64[Tensor, " M"],
+        first: Integer[Tensor, " M"],
     ) -> Float[Tensor, " M"]:
         """Signed distance in metres at some columns, each of them once; differentiable in `points`.
 
@@ -44,33 +50,28 @@ class PackedVolumes:
         self, points: Float[Tensor, "3 P"], columns: Int64[Tensor, " M"]
     ) -> UInt8[Tensor, " M"]:
         """Class at the nearest node."""
-        node = self.position(points.index_select(1, columns)).round_().to(torch.int64)
+        node = self.clamp_(self.steps(points.index_select(1, columns))).round_()
         return self.label.index_select(0, self.flat(node))
 
     def possibly_inside(self, points: Float[Tensor, "3 P"]) -> Bool[Tensor, " P"]:
         """Points in cells one of whose corners is inside something: no other has a depth."""
-        # Integers of half the size: this is the one step that every vertex takes part in.
-        small = torch.int32 if self.thick_from < 2**31 else torch.int64
-        node = self.position(points).to(small)
-        return self.solid.index_select(0, self.flat(node))
-
-    def position(self, points: Float[Tensor, "3 M"]) -> Float[Tensor, "3 M"]:
-        """Points in steps of the grid, clamped to it."""
-        return self.clamped(self.steps(points))
+        return self.solid.index_select(0, self.flat(self.clamp_(self.steps(points))))
 
     def steps(self, points: Float[Tensor, "3 M"]) -> Float[Tensor, "3 M"]:
         """Points in steps of the grid from its first node."""
-        return (points - self.origin[:, None]) / self.cell
+        return torch.add(self._before[:, None], points, alpha=1.0 / self.cell)
 
-    def clamped(self, position: Float[Tensor, "3 M"]) -> Float[Tensor, "3 M"]:
-        """The nearest position inside the grid."""
-        rows = zip(position, self.shape, strict=True)
-        return torch.stack([row.clamp(0, size - 1) for row, size in rows])
+    def clamp_(self, position: Float[Tensor, "3 M"], short: int = 1) -> Float[Tensor, "3 M"]:
+        """Clamp positions in place to the grid less `short` nodes at its end."""
+        for row, size in zip(position, self.shape, strict=True):
+            row.clamp_(0, size - short)
+        return position
 
-    def flat(self, node: Tensor) -> Tensor:
-        """Place of node (i, j, k) in a flattened volume."""
+    def flat(self, position: Float[Tensor, "3 M"]) -> Integer[Tensor, " M"]:
+        """Place in a flattened volume of the node at or below a position."""
         _, depth, height = self.shape
-        return node[0].mul(depth * height).add_(node[1], alpha=height).add_(node[2])
+        i, j, k = position.to(self._index)
+        return i.mul_(depth * height).add_(j, alpha=height).add_(k)
 
 
 class _Trilinear(torch.autograd.Function):
@@ -79,25 +80,23 @@ class _Trilinear(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, points: Any, columns: Any, first: Any, volumes: PackedVolumes) -> Any:
         steps = volumes.steps(points.index_select(1, columns))
-        position = volumes.clamped(steps)
-        node = position.to(torch.int64)
-        for row, size in zip(node, volumes.shape, strict=True):
-            row.clamp_(max=size - 2)
+        position = volumes.clamp_(steps.clone())
+        node = volumes.clamp_(position.floor(), short=2)
         x, y, z = position - node
-        corner = _corners(volumes, first + volumes.flat(node))
+        corner = _corners(volumes, volumes.flat(node).add_(first))
         along_z = corner[:, :, 1] - corner[:, :, 0]
-        face = corner[:, :, 0] + z * along_z
+        face = torch.addcmul(corner[:, :, 0], along_z, z)
         along_y = face[:, 1] - face[:, 0]
-        edge = face[:, 0] + y * along_y
+        edge = torch.addcmul(face[:, 0], along_y, y)
         along_x = edge[1] - edge[0]
         if ctx.needs_input_grad[0]:
-            rise = along_z[:, 0] + y * (along_z[:, 1] - along_z[:, 0])
-            slope = torch.stack([along_x, _mix(x, along_y), _mix(x, rise)]) / volumes.cell
+            rise = torch.addcmul(along_z[:, 0], along_z[:, 1] - along_z[:, 0], y)
+            slope = torch.stack([along_x, _mix(x, along_y), _mix(x, rise)]).div_(volumes.cell)
             # Beyond the border the value no longer depends on that coordinate.
             slope *= position == steps
             ctx.save_for_backward(columns, slope)
             ctx.n_points = points.shape[1]
-        return edge[0] + x * along_x
+        return torch.addcmul(edge[0], along_x, x)
 
     @staticmethod
     @once_differentiable
@@ -108,13 +107,12 @@ class _Trilinear(torch.autograd.Function):
         return gradient, None, None, None
 
 
-def _corners(volumes: PackedVolumes, base: Int64[Tensor, " M"]) -> Float[Tensor, "2 2 2 M"]:
-    """The values at the eight corners of cells, by their lowest corner's place."""
+def _corners(volumes: PackedVolumes, base: Integer[Tensor, " M"]) -> Float[Tensor, "2 2 2 M"]:
+    """The values at the eight corners of cells, by the place of their lowest corner."""
     _, depth, height = volumes.shape
     steps = [i * depth * height + j * height + k for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-    return torch.stack([volumes.distances.index_select(0, base + step) for step in steps]).reshape(
-        2, 2, 2, -1
-    )
+    places = base + torch.tensor(steps, dtype=base.dtype, device=base.device)[:, None]
+    return volumes.distances.index_select(0, places.flatten()).reshape(2, 2, 2, -1)
 
 
 def _mix(share: Float[Tensor, " M"], ends: Float[Tensor, "2 M"]) -> Float[Tensor, " M"]:
