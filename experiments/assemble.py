@@ -141,6 +141,7 @@ def _method_records(config: StimulusSetConfig) -> list[dict[str, Any]]:
             "name": name,
             "display_name": METHODS[name].display_name,
             "study_method": name in config.study_methods,
+            "shares_motion": METHODS[name].shares_motion,
             "preset": config.placement.preset,
         }
         for name in config.methods

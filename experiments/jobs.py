@@ -157,11 +157,13 @@ def run_place(job: PlaceJob) -> str:
     }
     try:
         settings = PRESETS[job.config.placement.preset]
-        placement = METHODS[job.method].place(motion, scene, body, settings, job.config.seed)
+        method = METHODS[job.method]
+        placement = method.place(motion, scene, body, settings, job.config.seed)
     except PlacementError as error:
         record["failure"] = str(error)
     else:
-        record["scores"] = score(placement.motion, motion, scene, body, settings)
+        shared = method.shares_motion
+        record["scores"] = score(placement.motion, motion, scene, body, settings, shared)
         record["terms"] = placement.terms
         record["info"] = placement.info
         write_placement(placement, folder.placement_stem(job.scene, job.motion_id, job.method))
@@ -170,12 +172,17 @@ def run_place(job: PlaceJob) -> str:
 
 
 def score(
-    placed: Motion, original: Motion, scene: Scene, body: BodyModel, settings: Any
+    placed: Motion,
+    original: Motion,
+    scene: Scene,
+    body: BodyModel,
+    settings: Any,
+    shares_motion: bool = True,
 ) -> dict[str, float]:
     """Plausibility scores of a placed motion as plain numbers for the catalogue."""
     from experiments.metrics import plausibility
 
-    return plausibility(placed, original, scene, body, settings).as_dict()
+    return plausibility(placed, original, scene, body, settings, shares_motion).as_dict()
 
 
 def load_inputs(

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Integer
 
-from experiments.alteration import AlterationCost, alteration_cost
+from experiments.alteration import AlterationCost, alteration_cost, foot_skate
 from experiments.body.model import BodyModel
 from experiments.interaction.features import InteractionFeatures
 from experiments.motion.motion import Motion
@@ -52,12 +52,17 @@ class PlausibilityScores:
     deep: Float[np.ndarray, " T"]
     """Share of the skin's vertices deeper than `DEEP_M` inside something, per frame."""
     predicted_near: float
-    """cv2: share of the predicted contact vertices within 2 cm of the scene; nan without any."""
+    """cv2: share of the predicted contact vertices within 2 cm of the scene; nan without any.
+
+    This and the next two do not apply to a method that does not share the motion: nan."""
     semantic_match: float
     """Share of the predicted contact vertices nearest to the predicted class; nan without any."""
     frames_with_prediction: float
     """Share of the frames with at least one predicted contact vertex."""
-    alteration: AlterationCost
+    foot_skate_cm_s: float
+    """Mean horizontal speed of sole vertices on the ground, cm/s."""
+    alteration: AlterationCost | None
+    """None for a method that does not share the motion: there is nothing that it altered."""
 
     def as_dict(self) -> dict[str, float]:
         """Means over frames as plain numbers, for the catalogue; what has no value is left out."""
@@ -72,21 +77,32 @@ class PlausibilityScores:
             "depth_sum_m": float(self.depth_sum.mean()),
             "depth_max_m": float(self.depth_max.max()),
             "deeper_1cm": float(self.deep.mean()),
-            **dataclasses.asdict(self.alteration),
+            "foot_skate_cm_s": self.foot_skate_cm_s,
+            **(dataclasses.asdict(self.alteration) if self.alteration else {}),
         }
         return {name: value for name, value in scores.items() if np.isfinite(value)}
 
 
 def plausibility(
-    placed: Motion, original: Motion, scene: Scene, body: BodyModel, settings: PlacementSettings
+    placed: Motion,
+    original: Motion,
+    scene: Scene,
+    body: BodyModel,
+    settings: PlacementSettings,
+    shares_motion: bool = True,
 ) -> PlausibilityScores:
     """Score a placed motion (scene's frame) against the scene and against the motion it came from.
 
-    The predicted contacts are those that every method of this motion and scene was given.
+    The predicted contacts are those that every method of this motion and scene was given. Without
+    `shares_motion` the placed motion only fills the slot of `original`: contacts predicted for
+    another motion and the cost of altering it say nothing about it and are left out.
     """
-    features = choose_features(original, scene, body, settings)
     distance, label = skin_distances(placed, scene, body)
-    predicted = _predicted(placed, scene, body, features, settings.contact_threshold)
+    predicted, alteration = _NOT_PREDICTED, None
+    if shares_motion:
+        features = choose_features(original, scene, body, settings)
+        predicted = _predicted(placed, scene, body, features, settings.contact_threshold)
+        alteration = alteration_cost(placed, original, body)
     return PlausibilityScores(
         non_collision=(distance > 0.0).mean(1),
         contact=_any_below(distance, 0.0),
@@ -95,7 +111,8 @@ def plausibility(
         depth_sum=np.maximum(-distance, 0.0).sum(1),
         depth_max=np.maximum(-distance, 0.0).max(1),
         deep=(distance < -DEEP_M).mean(1),
-        alteration=alteration_cost(placed, original, body),
+        foot_skate_cm_s=alteration.foot_skate_cm_s if alteration else foot_skate(placed, body),
+        alteration=alteration,
         **predicted,
     )
 
@@ -122,6 +139,11 @@ def _any_below(distance: Float[np.ndarray, "T V"], limit: float) -> Float[np.nda
     # "Non-positive" in PACE's text: a vertex exactly on the surface touches.
     touching: Float[np.ndarray, " T"] = np.any(distance <= limit, axis=1).astype(np.float64)
     return touching
+
+
+_NOT_PREDICTED = {
+    name: float("nan") for name in ("predicted_near", "semantic_match", "frames_with_prediction")
+}
 
 
 def _predicted(

@@ -12,6 +12,7 @@ from experiments.methods.paak import paak
 from experiments.methods.pace import pace
 from experiments.methods.plus import paak_plus, pace_plus, posa_t_plus
 from experiments.methods.posa_t import posa_t
+from experiments.methods.synthesis import display_name, synthesis
 from experiments.motion.motion import Motion
 from experiments.placement.placement import Placement
 from experiments.placement.settings import PlacementSettings
@@ -20,7 +21,7 @@ from experiments.scene.scene import Scene
 Place = Callable[[Motion, Scene, BodyModel, PlacementSettings, int], Placement]
 """(motion, scene, body, settings, seed) -> placement; raises `PlacementError` where there is none.
 
-The seed stands for all that a method draws at random; the methods here draw nothing and record it.
+The seed stands for all that a method draws at random; `synthesis` alone draws, the others record it.
 """
 
 
@@ -38,6 +39,9 @@ class Method:
     block: Literal["paper", "plus", "ablation"] = "paper"
     """Which table it stands in: `plus` methods share scene terms of ours that the paper does not
     print, so that they compare with one another and not with the `paper` block."""
+    shares_motion: bool = True
+    """Whether the motion that it is given is the one that it places; if not, it fills the motion's slot
+    (name, frames, frame rate) with a motion of its own."""
 
 
 METHODS: dict[str, Method] = {
@@ -47,6 +51,14 @@ METHODS: dict[str, Method] = {
         "POSA's loss summed over all frames; the motion is moved rigidly, all frames count alike",
         alters_motion=False,
         study=True,
+    ),
+    "synthesis": Method(
+        synthesis,
+        display_name(),
+        "a motion of its own for the room: sub-goal bodies, route, poses, refinement (Wang et al. 2021)",
+        alters_motion=True,
+        study=True,
+        shares_motion=False,
     ),
     "paak": Method(
         paak,
