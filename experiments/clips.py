@@ -40,6 +40,8 @@ class Take:
     role: str
     method: str
     vertices: Float[np.ndarray, "T V 3"]
+    fps: float
+    """Of the motion; the clip's own rate is a render setting."""
     scores: dict[str, float]
     placement: str
 
@@ -70,7 +72,7 @@ def render_job(job: RenderJob) -> None:
         )
         for take in takes:
             stage = Stage(
-                parts, scene.room_size, take.vertices, body.faces, settings.fps, scene.floor_z,
+                parts, scene.room_size, take.vertices, body.faces, take.fps, scene.floor_z,
                 regions=body.regions,
             )  # fmt: skip
             clips.append(_finished(job, take) or _render_take(job, take, stage, rig, settings))
@@ -117,7 +119,8 @@ def _take(
     motion = trim(motion, seconds) if seconds else motion
     record = read_json(folder.record_path(job.scene, job.motion_id, method))
     scores = record["scores"] if role == "main" else {}
-    return Take(role, method, skinned(body, motion), scores, f"placements/{stem.name}.json")
+    source = f"placements/{stem.name}.json"
+    return Take(role, method, skinned(body, motion), motion.fps, scores, source)
 
 
 def _finished(job: RenderJob, take: Take) -> dict[str, Any] | None:

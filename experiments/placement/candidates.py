@@ -48,8 +48,8 @@ class Starts:
         return dataclasses.replace(self, score=score)
 
 
-def find_starts(problem: Problem) -> Starts:
-    """The `n_starts` best distinct starts, best first.
+def find_starts(problem: Problem, spare: int = 0) -> Starts:
+    """The `n_starts` best distinct starts, best first, and as many more as `spare` asks for.
 
     Raises `MotionTooLong` if no start keeps the pelvis inside the room, `NoAdmissibleStart` if the
     start filter leaves none.
@@ -57,7 +57,7 @@ def find_starts(problem: Problem) -> Starts:
     ranked = rank_starts(problem, start_grid(problem))
     settings = problem.settings
     apart = suppress(ranked, settings.suppress_distance, settings.suppress_angle_deg)
-    return apart.take(np.arange(min(settings.n_starts, len(apart))))
+    return apart.take(np.arange(min(settings.n_starts + spare, len(apart))))
 
 
 def start_grid(problem: Problem) -> Starts:

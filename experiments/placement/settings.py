@@ -74,6 +74,8 @@ class PlacementSettings:
     """See `suppress_distance`."""
     n_starts: int = 3
     """Starts that are optimised (POSA: 10)."""
+    spare_starts: int = 4
+    """Further starts that are tried in the place of rigid fits with a fault."""
     n_altered: int = 3
     """Starts, best rigid fits first, whose motion is altered (PACE)."""
 
