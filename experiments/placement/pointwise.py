@@ -32,8 +32,9 @@ def pointwise_terms(
         body = frame_vertices(problem, frame, yaw, translation, delta[frame], shift[frame])
         for name, value in _scene_frame(problem, frame, body).items():
             terms[name] += k * value
+        stiffness = k if problem.settings.weighted_alteration else 1.0
         for name, value in _alteration_frame(problem, frame, delta, shift).items():
-            terms[name] += k * value
+            terms[name] += stiffness * value
     return terms
 
 

@@ -106,6 +106,11 @@ class Problem(RigidProblem):
         """The vertices of the energy, in the body's full numbering."""
         return self.features.vertex_ids
 
+    @property
+    def stiffness(self) -> Float[Tensor, " T"]:
+        """Frame weights of E_alt: k as printed, or one for every frame."""
+        return self.k if self.settings.weighted_alteration else torch.ones_like(self.k)
+
     def weighted(self, weights: FrameWeights) -> Problem:
         """The same with other frame weights."""
         k = torch.as_tensor(weights.values, dtype=self.k.dtype)

@@ -103,6 +103,9 @@ class PlacementSettings:
     bend_weight: float = 0.0
     """Weight of squared second differences of the alteration along time, per rad², and times
     `lambda_tau` per m² (ours)."""
+    weighted_alteration: bool = True
+    """Multiply E_alt by the frame weights as printed, so that important frames are held more
+    stiffly too; False holds all frames alike."""
     time_aware: bool = True
     """Scale frame-to-frame differences to steps of 1/30 s; False is the printed form."""
 

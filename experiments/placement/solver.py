@@ -90,7 +90,7 @@ def fit_altered(
             placed, delta, shift = variables.decode(state)
             bodies = altered_bodies(problem, placed, delta, shift)
             terms = engine.terms(problem, bodies, huber, False)
-            costs = alteration_terms(delta, shift, problem.k, problem.step_scale, weights)
+            costs = alteration_terms(delta, shift, problem.stiffness, problem.step_scale, weights)
             extra = steadiness.terms(bodies, placed, delta, shift)
             return total({**terms, **costs, **extra})
 
@@ -120,7 +120,9 @@ class _Variables:
         self._origin, self._scale = _rigid_state(problem, rigid.yaw, rigid.translation)
         dtype = self._origin.dtype
         basis = alteration_basis(
-            problem.k.double().numpy(), problem.step_scale.double().numpy(), problem.settings
+            problem.stiffness.double().numpy(),
+            problem.step_scale.double().numpy(),
+            problem.settings,
         )
         self._pose = torch.as_tensor(basis.pose, dtype=dtype)
         self._translation = torch.as_tensor(basis.translation, dtype=dtype)
@@ -195,7 +197,7 @@ def _fit(
     with torch.no_grad():
         bodies = altered_bodies(problem, placed, delta, shift)
         terms = engine_of(problem.settings).terms(problem, bodies, 0.0, True)
-        costs = alteration_terms(delta, shift, problem.k, problem.step_scale, weights)
+        costs = alteration_terms(delta, shift, problem.stiffness, problem.step_scale, weights)
         extra = Steadiness(problem, weights).terms(bodies, placed, delta, shift)
     named = {name: float(value) for name, value in {**terms, **costs, **extra}.items()}
     numbers = placed.detach().double().numpy()

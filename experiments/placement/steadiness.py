@@ -43,11 +43,11 @@ class Steadiness:
             )
             error = bodies[:, self._columns] - original
             slide = slide_loss(error, self._stance, problem.step_scale)
-            found["slide"] = weights.slide_weight * (slide @ problem.k)
+            found["slide"] = weights.slide_weight * (slide @ problem.stiffness)
         if weights.bend_weight:
             pose = bend_loss(delta, problem.step_scale)
             root = weights.lambda_tau * bend_loss(shift, problem.step_scale)
-            found["bend"] = weights.bend_weight * ((pose + root) @ problem.k)
+            found["bend"] = weights.bend_weight * ((pose + root) @ problem.stiffness)
         return found
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,6 +64,17 @@ def test_whitened_and_raw_variables_span_the_same_alterations() -> None:
     wanted = np.random.default_rng(3).normal(size=25)
     u = np.linalg.solve(basis.pose, wanted)
     assert basis.pose @ u == pytest.approx(wanted, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["whitened", "raw", "dct"])
+def test_the_same_alteration_costs_the_same_in_every_basis(name: str) -> None:
+    rng = np.random.default_rng(4)
+    k, weights = rng.uniform(0.2, 2, 40), PlacementSettings(dct_per_frame=0.25)
+    smooth = alteration_basis(k, np.ones(40), replace(weights, parameterisation="dct")).pose
+    change = smooth @ rng.normal(size=smooth.shape[1])
+    basis = alteration_basis(k, np.ones(40), replace(weights, parameterisation=name)).pose
+    u = np.linalg.lstsq(basis, change, rcond=None)[0]
+    assert energy(basis @ u, k, weights) == pytest.approx(energy(change, k, weights), rel=1e-9)
 
 
 def test_the_smooth_basis_holds_no_frequency_above_its_limit() -> None:
