@@ -81,20 +81,14 @@ def table(folder: Path, as_json: bool) -> None:
 @_JOBS
 @_JSON
 def evaluate(config: Path, out: Path, jobs: int, as_json: bool) -> None:
-    """Place and score everything CONFIG asks for, without rendering."""
+    """Place, score and compare everything CONFIG asks for, without rendering."""
     from experiments.config import read_config
-    from experiments.evaluate import plausibility_table, write_evaluation
-    from experiments.pipeline import place_set
+    from experiments.evaluate import evaluate_set, plausibility_table
 
-    settings = read_config(config)
     with progress_bars(f"{sys.argv[0]} evaluate {config} --out {out}") as progress:
-        folder = place_set(settings, out, jobs, progress)
-    evaluation = write_evaluation(settings, folder)
-    click.echo(
-        json.dumps({"methods": evaluation["methods"]})
-        if as_json
-        else plausibility_table(evaluation)
-    )
+        evaluation = evaluate_set(read_config(config), out, jobs, progress)
+    record = {"methods": evaluation["methods"], "table": str(out / "table.md")}
+    click.echo(json.dumps(record) if as_json else plausibility_table(evaluation))
 
 
 @click.command()

@@ -20,6 +20,10 @@ class PlacementConfig:
 
     preset: str = "default"
     """Name of a `PlacementSettings` preset: fast, default or paper."""
+    full_preset: str = "default"
+    """`evaluate` also places some motions with this fuller preset, see `full_motions`."""
+    full_motions: int = 0
+    """How many motions a room, the first ones, the study methods place with `full_preset` too."""
 
 
 @dataclass(frozen=True)
@@ -159,6 +163,7 @@ def _validate(source: Path, config: StimulusSetConfig) -> None:
     for name, number in {
         "cut_seconds": config.cut_seconds,
         "other_methods_motions": config.other_methods_motions,
+        "placement.full_motions": config.placement.full_motions,
         "extras.catch": config.extras.catch,
         "extras.practice": config.extras.practice,
     }.items():

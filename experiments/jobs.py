@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.config import StimulusSetConfig
+from experiments.placement.settings import PRESETS
 from experiments.records import Key, SetFolder
 from renderer.files import file_sha256, read_json, value_sha256, write_json
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from experiments.body.model import BodyModel
     from experiments.motion.motion import Motion
     from experiments.scene.scene import Scene
+
+WEIGHTS = Path(__file__).resolve().parent / "assets" / "weights"
 
 
 @dataclass(frozen=True)
@@ -47,10 +50,11 @@ class PlaceJob:
     def input_hash(self) -> str:
         """What the placement depends on."""
         config = self.config
-        placement = dataclasses.asdict(config.placement)
-        parts = [config.seed, config.body, config.cut_seconds, config.motions_dir, placement]
+        settings = PRESETS[config.placement.preset].config_hash()
+        parts = [config.seed, config.body, config.cut_seconds, config.motions_dir, settings]
         seconds = config.extras.seconds if self.is_extra else None
-        return value_sha256([*parts, self.scene, self.motion_id, self.method, seconds])
+        own = [self.scene, self.motion_id, self.method, seconds]
+        return value_sha256([*parts, *own, shipped_weights()])
 
     @property
     def is_extra(self) -> bool:
@@ -63,6 +67,12 @@ class PlaceJob:
         path = SetFolder(self.folder).record_path(self.scene, self.motion_id, self.method)
         same = path.exists() and read_json(path).get("input_hash") == self.input_hash()
         return "reused" if same else None
+
+
+@lru_cache(maxsize=1)
+def shipped_weights() -> dict[str, str]:
+    """Hashes of the networks' weights: a placement made with others is made again."""
+    return {path.name: file_sha256(path) for path in sorted(WEIGHTS.glob("*.safetensors"))}
 
 
 @dataclass(frozen=True)
@@ -138,7 +148,6 @@ def run_place(job: PlaceJob) -> str:
     from experiments.motion_class import motion_class
     from experiments.placement.errors import PlacementError
     from experiments.placement.placement import write_placement
-    from experiments.placement.settings import PRESETS
 
     folder = SetFolder(job.folder)
     scene, body, motion = load_inputs(job.config, job.scene, job.motion_id, job.is_extra)

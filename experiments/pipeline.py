@@ -121,6 +121,7 @@ def validate_names(config: StimulusSetConfig) -> None:
         ("motions", config.motions, motions),
         ("extras.practice_motion", extra_motions(config), motions),
         ("placement.preset", [config.placement.preset], PLACEMENT_PRESETS),
+        ("placement.full_preset", [config.placement.full_preset], PLACEMENT_PRESETS),
         ("render.preset", [config.render.preset], RENDER_PRESETS),
     ]
     rooms = (*TEST_ROOMS, *TRAINING_ROOMS)
