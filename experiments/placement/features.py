@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+
+import numpy as np
 
 from experiments.body.model import BodyModel
 from experiments.interaction.features import InteractionFeatures
@@ -23,10 +26,11 @@ def choose_features(
 ) -> InteractionFeatures:
     """The feature map that every method and metric uses for this motion in this scene.
 
-    `posa`: the first whose most common class exists in the scene. `search` (ours): the one whose
-    best start is best at uniform weights, whatever the method, so that all methods are asked for
-    the same contacts. Raises `PlacementError` where no map has a start. The last answers are
-    remembered: all methods, and the scores of each, ask for the same map.
+    `posa`: the first whose most common class exists in the scene. `search` (ours): of the first maps
+    that share their contacts and of which one has a start, the one whose best start is best at
+    uniform weights, whatever the method, so that all methods are asked for the same contacts.
+    Raises `PlacementError` where no map has a start. The last answers are remembered: all methods,
+    and the scores of each, ask for the same map.
     """
     if settings.interaction not in INTERACTIONS:
         wanted = "one of " + ", ".join(INTERACTIONS)
@@ -58,15 +62,33 @@ def _chosen(question: _Question) -> InteractionFeatures:
         return maps[first_fitting_map(maps, scene)]
     if len(maps) == 1:
         return maps[0]
-    scores: list[tuple[float, int]] = []
     refusal: NoAdmissibleStart | None = None
+    for rivals in alike_in_contact(maps, settings.contact_threshold):
+        scores: list[tuple[float, int]] = []
+        for index in rivals:
+            problem = build_problem(motion, scene, body, settings, maps[index])
+            try:
+                scores.append((coarse_best(problem, start_grid(problem)), index))
+            except NoAdmissibleStart as error:
+                refusal = refusal or error
+        if scores:
+            return maps[min(scores)[1]]
+    assert refusal is not None
+    raise refusal
+
+
+def alike_in_contact(maps: Sequence[InteractionFeatures], threshold: float) -> list[list[int]]:
+    """Indices of the maps, those that expect the same contacts together, in order of preference.
+
+    Energies of maps compare only where the contacts are the same: who expects fewer pays less.
+    """
+    groups: list[list[int]] = []
     for index, features in enumerate(maps):
-        problem = build_problem(motion, scene, body, settings, features)
-        try:
-            scores.append((coarse_best(problem, start_grid(problem)), index))
-        except NoAdmissibleStart as error:
-            refusal = refusal or error
-    if not scores:
-        assert refusal is not None
-        raise refusal
-    return maps[min(scores)[1]]
+        touching = features.contact > threshold
+        for group in groups:
+            if np.array_equal(maps[group[0]].contact > threshold, touching):
+                group.append(index)
+                break
+        else:
+            groups.append([index])
+    return groups
