@@ -137,10 +137,10 @@ def _lying(scene: Scene, rest: Float[np.ndarray, "V 3"], body: BodyModel) -> lis
     for place, points in _tops(scene, BEDS, BED_HEIGHT_M).items():
         for yaw in _YAWS:
             along = heading(yaw)
-            held = [distance(_up(points + s * along, -0.06)) < 0.0 for s in _HELD]
+            across = np.cross(along, [0.0, 0.0, 1.0])
+            held = [distance(_up(points + s * along + t * across, -0.06)) < 0.0 for s, t in _HELD]
             clear = [distance(_up(points + s * along, 0.25)) > 0.08 for s in _CLEAR]
             for index in np.flatnonzero(np.all(held + clear, axis=0)):
-                across = np.cross(along, [0.0, 0.0, 1.0])
                 # Columns: where the body's left, head and front point.
                 turn = np.stack([across, along, np.array([0.0, 0.0, 1.0])], axis=1)
                 found.append(Spot("lie", place, _up(points[index : index + 1], rise)[0], turn))
@@ -171,7 +171,16 @@ def _touching(scene: Scene, free: Float[np.ndarray, "N 2"], standing_z: float) -
 
 
 _YAWS = tuple(2 * np.pi * np.arange(N_HEADINGS) / N_HEADINGS)
-_HELD = (-0.7, -0.45, -0.2, 0.0, 0.25, 0.5)
+_HELD = (
+    (-0.8, 0.0),
+    (-0.4, 0.0),
+    (0.0, 0.15),
+    (0.0, -0.15),
+    (0.35, 0.15),
+    (0.35, -0.15),
+    (0.6, 0.0),
+)
+"""Along and across the lying body, metres from the pelvis: where the surface must be."""
 _CLEAR = (-0.9, -0.6, -0.3, 0.0, 0.35, 0.7)
 
 
