@@ -97,3 +97,46 @@ def weights(out: Path, interaction: str, seed: int, epochs: int, as_json: bool) 
     with progress_bars(f"{again} --epochs {epochs}") as bars:
         report = run_training(settings, out, bars)
     click.echo(json.dumps(report) if as_json else run_summary(report))
+
+
+@train.command()
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the run.")
+@click.option(
+    "--motions",
+    type=click.Path(path_type=Path),
+    help="Folder with AMASS, CMU or BVH recordings; default: CMU's under PACE_SHARED.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the run.")
+@click.option("--epochs", type=click.IntRange(1), help="Of every network; default 30, 25 and 20.")
+@click.option("--device", default="cpu", show_default=True, help="Torch device, e.g. cuda.")
+@click.option("--resume", is_flag=True, help="Go on from the checkpoints in the folder.")
+@click.option("--report", is_flag=True, help="Held-out scores, amounts of capture, pictures.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def synthesis(
+    out: Path,
+    motions: Path | None,
+    seed: int,
+    epochs: int | None,
+    device: str,
+    resume: bool,
+    report: bool,
+    as_json: bool,
+) -> None:
+    """Train the three networks of motion synthesis (Wang et al. 2021, re-implemented)."""
+    from experiments.cli import progress_bars
+    from experiments.interaction.training_run import check_device
+    from experiments.synthesis.placed_windows import DataSettings
+    from experiments.synthesis.training import Plan
+    from experiments.synthesis.training_run import run_training, summary
+
+    check_device(device)
+    plan = Plan(seed=seed, device=device)
+    if epochs is not None:
+        plan = Plan(seed=seed, epochs=(epochs, epochs, epochs), device=device)
+    where = "" if motions is None else f" --motions {motions}"
+    again = f"pace-study train synthesis --out {out}{where} --seed {seed} ... --resume"
+    with progress_bars(again) as bars:
+        record = run_training(
+            DataSettings(seed=seed, motions=motions), plan, out, resume, report, bars
+        )
+    click.echo(json.dumps(record) if as_json else summary(record))

@@ -23,7 +23,14 @@ from experiments.synthesis.route_net import RouteNet
 from experiments.synthesis.subgoal_net import SubgoalNet
 from experiments.synthesis.tasks import PoseTask, RouteTask, SubgoalTask, Task
 from experiments.synthesis.training_set import TrainingSet
-from experiments.synthesis.weights import Kind, TrainingNote, weights_file, write_weights
+from experiments.synthesis.weights import (
+    Kind,
+    SynthesisNets,
+    TrainingNote,
+    load_nets,
+    weights_file,
+    write_weights,
+)
 from renderer.files import InputError, atomic_path, read_json, write_json
 
 Net = TypeVar("Net", bound=nn.Module)
@@ -41,7 +48,7 @@ class Plan:
     """How long and how fast the networks learn."""
 
     seed: int = 0
-    epochs: tuple[int, int, int] = (20, 20, 20)
+    epochs: tuple[int, int, int] = (30, 25, 20)
     """Of RouteNet, PoseNet and the sub-goal network."""
     rates: tuple[float, float, float] = (1e-3, 1e-3, 5e-4)
     batch: int = 64
@@ -65,8 +72,10 @@ def train_synthesis(
     folder: Path,
     resume: bool,
     on_step: Callable[[float], None] = lambda share: None,
-) -> dict[Kind, list[CurveRow]]:
-    """Train the three networks into `folder` and write their weights; returns the learning curves.
+) -> tuple[dict[Kind, list[CurveRow]], SynthesisNets]:
+    """Train the three networks into `folder` and write their weights; returns curves and networks.
+
+    A network with no epochs keeps its first, random weights.
 
     Interrupted, it goes on from its last checkpoints when called again with `resume`, and ends with
     the weights of an uninterrupted run. Raises `InputError` if `folder` holds another run.
@@ -76,6 +85,7 @@ def train_synthesis(
     device = torch.device(plan.device)
     train, held = TrainingSet(data, "train", device), TrainingSet(data, "held_out", device)
     curves: dict[Kind, list[CurveRow]] = {}
+    note = TrainingNote(RECIPE, plan.seed, data.capture_minutes())
     route = _seeded(RouteNet, plan.seed).to(device)
     for index, kind in enumerate(ORDER):
         task = _task(kind, route, train, held, plan)
@@ -84,9 +94,8 @@ def train_synthesis(
             on_step((done + share) / len(ORDER))
 
         curves[kind] = train_task(task, plan, index, folder, on_share)
-        note = TrainingNote(RECIPE, plan.seed, data.capture_minutes())
         write_weights(task.net, kind, note, weights_file(kind, folder))
-    return curves
+    return curves, load_nets(folder)
 
 
 def train_task(
