@@ -1,0 +1,68 @@
+"""Labels of one clip: a scene is drawn, distances are taken, frames that cannot be are dropped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Integer, UInt8
+
+from experiments.interaction.contact_holds import PosedClip, find_holds
+from experiments.interaction.contact_scene import ContactScene
+from experiments.interaction.contact_supports import draw_scene
+
+DEEPEST_M = 0.035
+"""A frame with a vertex deeper than this inside anything is dropped."""
+FURTHEST_M = 0.06
+"""A frame with nothing this near to trunk, legs or head hangs on something that was not recorded."""
+DRAWS = 8
+ENOUGH = 0.9
+"""A scene that keeps this share of the frames is taken at once."""
+
+
+@dataclass(frozen=True)
+class LabelledFrames:
+    """Some frames of a clip with what is nearest to every vertex."""
+
+    frames: Integer[np.ndarray, " F"]
+    distance: Float[np.ndarray, "F V"]
+    """Unsigned, metres."""
+    nearest: UInt8[np.ndarray, "F V"]
+    scene: ContactScene
+
+
+def label_clip(clip: PosedClip, stride: int, rng: np.random.Generator) -> LabelledFrames:
+    """The best of some random scenes and the frames it leaves; perhaps none.
+
+    The later draws leave out what does not carry the body: back rests, arms, walls beside.
+    """
+    holds = find_holds(clip)
+    frames = np.arange(0, len(clip.times), stride)
+    best: LabelledFrames | None = None
+    for attempt in range(DRAWS):
+        scene = draw_scene(clip, holds, rng, sparing=attempt >= DRAWS // 2)
+        found = in_scene(clip, scene, frames)
+        if best is None or len(found.frames) > len(best.frames):
+            best = found
+        if len(best.frames) >= ENOUGH * len(frames):
+            break
+    assert best is not None
+    return best
+
+
+def in_scene(
+    clip: PosedClip, scene: ContactScene, frames: Integer[np.ndarray, " F"]
+) -> LabelledFrames:
+    """The frames that are possible in a scene, and their labels."""
+    distance, nearest, depth = scene.nearest(clip.vertices[frames])
+    hands = np.concatenate([clip.columns[name] for name in ("left_hand", "right_hand", "forearms")])
+    carrying = np.setdiff1d(np.arange(distance.shape[1]), hands)
+    keep = possible(distance[:, carrying], depth)
+    return LabelledFrames(frames[keep], distance[keep], nearest[keep], scene)
+
+
+def possible(
+    carrying: Float[np.ndarray, "F C"], depth: Float[np.ndarray, "F V"]
+) -> Bool[np.ndarray, " F"]:
+    """Frames without deep penetration in which something other than hands and forearms is supported."""
+    return np.asarray((depth.max(1) <= DEEPEST_M) & (carrying.min(1) <= FURTHEST_M))
