@@ -35,14 +35,17 @@ def build(config: Path, out: Path, jobs: int, as_json: bool) -> None:
     from experiments.pipeline import build_set
 
     with progress_bars(f"{sys.argv[0]} stimuli build {config} --out {out}") as progress:
-        outcome = build_set(read_config(config), out, jobs, progress)
+        settings = read_config(config)
+        outcome = build_set(settings, out, jobs, progress)
     record = {
         "catalogue": str(out / "catalogue.json"),
         "placements": outcome.placements,
         "clips": outcome.clips,
         "dropped": list(outcome.dropped),
+        "motions": {"used": outcome.motions, "wanted": settings.motions_wanted or outcome.motions},
     }
     text = f"{outcome.clips} clips in {out}; {len(outcome.dropped)} (scene, motion) dropped"
+    text += _too_few(outcome.motions, settings.motions_wanted)
     click.echo(json.dumps(record) if as_json else text)
 
 
@@ -86,9 +89,12 @@ def evaluate(config: Path, out: Path, jobs: int, as_json: bool) -> None:
     from experiments.evaluate import evaluate_set, plausibility_table
 
     with progress_bars(f"{sys.argv[0]} evaluate {config} --out {out}") as progress:
-        evaluation = evaluate_set(read_config(config), out, jobs, progress)
+        settings = read_config(config)
+        evaluation = evaluate_set(settings, out, jobs, progress)
     record = {"methods": evaluation["methods"], "table": str(out / "table.md")}
-    click.echo(json.dumps(record) if as_json else plausibility_table(evaluation))
+    used = len(evaluation["conditions"]["motions"])
+    text = plausibility_table(evaluation) + _too_few(used, settings.motions_wanted)
+    click.echo(json.dumps(record) if as_json else text)
 
 
 @click.command()
@@ -134,6 +140,11 @@ def render(
     size = f"{record['width']} x {record['height']} pixels"
     frames = f"{record['n_frames']} frames, " if "n_frames" in record else ""
     click.echo(json.dumps(record) if as_json else f"{out}: {frames}{size}")
+
+
+def _too_few(used: int, wanted: int) -> str:
+    """What to say of a folder that holds fewer motions than the configuration wants."""
+    return f"\n{used} motions of the {wanted} wanted" if used < wanted else ""
 
 
 @contextmanager

@@ -69,6 +69,9 @@ class StimulusSetConfig:
     """Ids of default motions."""
     motions_dir: str = ""
     """Instead of `motions`: a folder of motion `.npz` files, relative to the config file."""
+    motions_wanted: int = 0
+    """How many motions of `motions_dir` to use, drawn by the seed; 0 means all. With fewer in the
+    folder, all are used and the build says how many there were."""
     body: str = "male_slim"
     """Which embedded adult acts."""
     cut_seconds: float = 0.0
@@ -162,6 +165,7 @@ def _validate(source: Path, config: StimulusSetConfig) -> None:
             raise InputError(source, name, number, "a positive number")
     for name, number in {
         "cut_seconds": config.cut_seconds,
+        "motions_wanted": config.motions_wanted,
         "other_methods_motions": config.other_methods_motions,
         "placement.full_motions": config.placement.full_motions,
         "extras.catch": config.extras.catch,
@@ -169,6 +173,8 @@ def _validate(source: Path, config: StimulusSetConfig) -> None:
     }.items():
         if number < 0:
             raise InputError(source, name, number, "zero or more")
+    if config.motions_wanted and not config.motions_dir:
+        raise InputError(source, "motions_wanted", config.motions_wanted, "0 without motions_dir")
     _validate_extras(source, config)
 
 

@@ -32,6 +32,8 @@ class BuildOutcome:
     dropped: tuple[dict[str, Any], ...]
     reused: int
     """Steps whose result was already there."""
+    motions: int = 0
+    """Motions of the main pool: fewer than `motions_wanted` where the folder has no more."""
 
 
 def build_set(
@@ -55,6 +57,7 @@ def build_set(
         clips=len(catalogue.clips),
         dropped=catalogue.dropped,
         reused=sum(1 for outcome in done if outcome == "reused"),
+        motions=len(folder.motion_ids(config)),
     )
 
 
@@ -64,6 +67,7 @@ def place_set(
     """Prepare rooms and motions, then place and score every combination; render nothing."""
     validate_names(config)
     folder = SetFolder(out)
+    folder.motion_ids(config)  # an empty folder of motions is refused before anything is computed
     folder.claim(config)
     prepares = [PrepareJob(config, scene) for scene in config.scenes]
     run_all(run_prepare, prepares, jobs, "prepare rooms", progress)

@@ -18,6 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from experiments.config import StimulusSetConfig
 from renderer.files import InputError, read_json, write_json
 
@@ -54,6 +56,11 @@ class SetFolder:
         found = sorted(item.stem for item in Path(config.motions_dir).glob("*.npz"))
         if not found:
             raise InputError(config.motions_dir, "motions_dir", "no .npz files", "motion files")
+        if 0 < config.motions_wanted < len(found):
+            # Drawn, because the names of capture data go by subject.
+            rng = np.random.default_rng(config.seed)
+            drawn = rng.choice(len(found), size=config.motions_wanted, replace=False)
+            found = [found[index] for index in sorted(drawn)]
         return tuple(found)
 
     def placement_stem(self, scene: str, motion_id: str, method: str) -> Path:
