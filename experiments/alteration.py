@@ -32,6 +32,8 @@ class AlterationCost:
     """Largest change of a frame-to-frame step of the root, mm."""
     jerk_change_mm: float
     """Mean joint jerk after minus before, mm per frame³."""
+    jerk_before_mm: float
+    """Mean joint jerk before, mm per frame³."""
     jerk_ratio: float
     """Mean joint jerk after over before; nan for a clip that is still to begin with."""
     foot_skate_cm_s: float
@@ -54,6 +56,7 @@ def alteration_cost(placed: Motion, original: Motion, body: BodyModel) -> Altera
         root_shift_mean_cm=float(100 * np.linalg.norm(residual, axis=-1).mean()),
         step_change_max_mm=float(1000 * steps.max()),
         jerk_change_mm=jerk - jerk_before,
+        jerk_before_mm=jerk_before,
         jerk_ratio=jerk / jerk_before if jerk_before > STILL_MM else float("nan"),
         foot_skate_cm_s=foot_skate(placed, body),
         foot_skate_before_cm_s=foot_skate(original, body),

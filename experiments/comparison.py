@@ -49,11 +49,17 @@ def kept_rows(rows: Sequence[Row]) -> list[Row]:
 
 
 def means(rows: Sequence[Row]) -> dict[str, float]:
-    """Every score's mean over clips; a score that some clips lack is the mean of the others."""
+    """Every score's mean over clips; a score that some clips lack is the mean of the others.
+
+    The jerk ratio is that of the means: clips that are almost still would govern a mean of ratios.
+    """
     scored = [row["scores"] for row in rows if not row["failure"]]
     names = sorted({name for scores in scored for name in scores})
     columns = {name: [scores[name] for scores in scored if name in scores] for name in names}
-    return {name: sum(values) / len(values) for name, values in columns.items()}
+    found = {name: sum(values) / len(values) for name, values in columns.items()}
+    if found.get("jerk_before_mm", 0.0) > 0.0:
+        found["jerk_ratio"] = 1.0 + found["jerk_change_mm"] / found["jerk_before_mm"]
+    return found
 
 
 def by_class(rows: Sequence[Row]) -> dict[str, dict[str, Any]]:

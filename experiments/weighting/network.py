@@ -48,15 +48,14 @@ class FrameWeightNetwork(nn.Module):
 
     def hidden(self, inputs: MotionInputs) -> Float[Tensor, "T H"]:
         """What the last layer reads: the diversity score is made of it."""
-        known = torch.cat([inputs.points, self.embedding(inputs.classes)], -1)
-        point = self.points(known)
+        point = self.points(torch.cat([inputs.points, self.embedding(inputs.classes)], -1))
         pooled = torch.cat([point.amax(1), point.mean(1), inputs.velocity], -1)
         frame = self.frame(pooled)
         # K_g ranks frames within their clip, so every frame is told what the others are like.
         mean = frame.mean(0, keepdim=True)
-        spread = (frame - mean).square().mean(0, keepdim=True).add(1e-6).sqrt()
-        clip = torch.cat([mean, spread], -1).expand(len(frame), -1)
-        state = self.context(torch.cat([frame, clip], -1)).T[None]
+        spread = (frame - mean).square().mean(0, keepdim=True).add(1e-4).sqrt()
+        known = [frame, (frame - mean) / spread, mean.expand(len(frame), -1)]
+        state = self.context(torch.cat(known, -1)).T[None]
         for dilation, layer in zip(DILATIONS, self.time, strict=True):
             state = state + functional.relu(_along_time(state, layer, dilation * inputs.stride))
         hidden: Float[Tensor, "T H"] = state[0].T

@@ -20,13 +20,16 @@ Guess = Callable[[TrainingClip], Float[np.ndarray, " T"]]
 def held_out_report(
     network: FrameWeightNetwork, clips: Sequence[TrainingClip]
 ) -> list[dict[str, Any]]:
-    """MAE and Spearman's rho against K_g, means over clips, for g and the guesses beside it.
+    """MAE and Spearman's rho against K_g, means over held-out clips, for g and guesses beside it.
 
-    One row a predictor; captured and authored clips apart and together.
+    One row a predictor; captured and authored clips apart and together. The rank of a frame's own
+    speed is scaled by a line fitted to the training clips.
     """
+    line = speed_line([clip for clip in clips if not clip.held_out])
+    clips = [clip for clip in clips if clip.held_out]
     guesses: dict[str, Guess] = {
         "network g": lambda clip: estimate(network, clip),
-        "own speed rank": speed_guess,
+        "own speed rank": lambda clip: line[0] + line[1] * relative_rank(clip.cues.speed),
         "constant": lambda clip: np.ones(clip.n_frames),
     }
     rows = []
@@ -47,10 +50,12 @@ def estimate(network: FrameWeightNetwork, clip: TrainingClip) -> Float[np.ndarra
         return np.asarray(network.expectation(scores).double().numpy())
 
 
-def speed_guess(clip: TrainingClip) -> Float[np.ndarray, " T"]:
-    """The rank of a frame's own speed within its clip, scaled to mean 1."""
-    rank = relative_rank(clip.cues.speed)
-    return rank / rank.mean()
+def speed_line(clips: Sequence[TrainingClip]) -> tuple[float, float]:
+    """Intercept and slope of K_g over the rank of a frame's own speed within its clip."""
+    rank = np.concatenate([relative_rank(clip.cues.speed) for clip in clips])
+    weights = np.concatenate([clip.cues.weights() for clip in clips])
+    slope, intercept = np.polyfit(rank, weights, 1)
+    return float(intercept), float(slope)
 
 
 def agreement(

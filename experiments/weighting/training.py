@@ -22,7 +22,8 @@ from experiments.weighting.weights_file import save_network
 from renderer.files import InputError, atomic_path, read_json, write_json
 
 RECIPE_VERSION = 1
-SHORTEST_CROP_S = 2.0
+CROP_S = (2.0, 6.0)
+"""Shortest and longest part of a clip that a training step sees."""
 FPS = 30.0
 
 
@@ -101,11 +102,9 @@ def weight_bins(
 
 
 def crop(clip: TrainingClip, generator: np.random.Generator) -> slice:
-    """A part of a clip, two seconds or longer; the whole of it about half of the time."""
-    shortest = min(clip.n_frames, round(SHORTEST_CROP_S * FPS))
-    if generator.random() < 0.5:
-        return slice(0, clip.n_frames)
-    length = int(generator.integers(shortest, clip.n_frames + 1))
+    """A part of a clip of two to six seconds, or the whole of a shorter one."""
+    shortest, longest = (min(clip.n_frames, round(s * FPS)) for s in CROP_S)
+    length = int(generator.integers(shortest, longest + 1))
     start = int(generator.integers(clip.n_frames - length + 1))
     return slice(start, start + length)
 
@@ -189,5 +188,5 @@ def _about(settings: TrainingSettings, clips: Sequence[TrainingClip]) -> dict[st
         "seed": str(settings.seed),
         "epochs": str(settings.epochs),
         "interaction": settings.interaction,
-        "motions": " ".join(sorted({clip.motion_id for clip in clips if not clip.held_out})),
+        "training_clips": str(sum(not clip.held_out for clip in clips)),
     }

@@ -1,34 +1,32 @@
-"""The clips that the network g is trained and judged on: the library's motions and variants of them."""
+"""The clips that the network g is trained and judged on: those of the interaction model's pose pool."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from experiments.body.embedded import BODY_NAMES, load_body
+from experiments.body.embedded import load_body
 from experiments.interaction.mesh import moving_body
+from experiments.interaction.pose_pool import PoseClip, pool_size, pose_pool
 from experiments.interaction.registry import INTERACTIONS
-from experiments.motion.library import MotionSpec, default_motions, extra_motions, load_motion
 from experiments.motion.motion import Motion
-from experiments.motion.resample import FPS, at_times, mirror
+from experiments.motion.resample import FPS, at_times, window
 from experiments.weighting.geometric import FrameCues, frame_cues
 from experiments.weighting.inputs import MotionInputs, motion_inputs
 
-HELD_OUT: tuple[str, ...] = ("walk_turn_right", "walk_turn_left", "walk_turn_sit", "sofa_sit",
-                             "lie_rest_get_up", "reach_forward", "floor_get_up", "cmu_02_06")  # fmt: skip
-"""Never trained on, with all their variants; a motion and its mirror image stay together."""
 SCENE_CLASSES: tuple[tuple[str, ...], ...] = (
     ("floor", "wall", "chair", "table", "cabinet", "shelving", "door"),
     ("floor", "wall", "sofa", "bed", "stool", "counter", "seating", "shelving"),
 )
 """Two made-up lists of what a scene has, so that the same motion is seen with other classes."""
-WARPS = 2
-"""Time-warped variants beside the clip as it is, of the motion and of its mirror image."""
+MOST_FRAMES = 300
+"""Longer clips are cut to a part of this length."""
 RATES = (1.0 / 3.0, 1.5)
-"""Range of speeds in a time-warped variant: a third of the speed is a long stand or sit."""
+"""Range of speeds in a time-warped clip: a third of the speed is a long stand or sit."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +34,10 @@ class TrainingClip:
     """One clip with its input to the network and what K_g is computed from."""
 
     name: str
-    motion_id: str
     captured: bool
+    held_out: bool
     inputs: MotionInputs
     cues: FrameCues
-
-    @property
-    def held_out(self) -> bool:
-        """Whether it belongs to the test split."""
-        return self.motion_id in HELD_OUT
 
     @property
     def n_frames(self) -> int:
@@ -55,29 +48,28 @@ class TrainingClip:
 def build_clips(
     interaction: str, seed: int, progress: Callable[[int, int], None] = lambda *_: None
 ) -> list[TrainingClip]:
-    """Every motion there is, mirrored and time-warped, on the four bodies in turn.
+    """Recorded and authored clips, four bodies in turn; of training clips two thirds, half of them
+    time-warped, because the pool has each in three versions that look alike.
 
-    CMU recordings are used where the folder `PACE_SHARED` has them.
+    The split is that of the pose pool, by clip: what the interaction model never saw is held out
+    here too. CMU recordings are used where the folder `PACE_SHARED` has them.
     """
-    specs = (*default_motions(), *extra_motions())
+    generator = np.random.default_rng([seed, 1])
     clips: list[TrainingClip] = []
-    total = len(specs) * 2 * (1 + WARPS)
-    for index, spec in enumerate(specs):
-        generator = np.random.default_rng([seed, index])
-        for flip in (False, True):
-            for variant in range(1 + WARPS):
-                body = BODY_NAMES[len(clips) % len(BODY_NAMES)]
-                clips.append(_clip(spec, body, flip, variant, interaction, generator))
-                progress(len(clips), total)
+    for index, source in enumerate(pose_pool(np.random.default_rng([seed, 0]))):
+        if source.split == "test" or index % 3 != 2:
+            clips.append(_clip(source, index % 3 == 1, interaction, generator))
+        progress(index + 1, pool_size())
     return clips
 
 
 def warp_times(
     times: Float[np.ndarray, " T"], generator: np.random.Generator
 ) -> Float[np.ndarray, " S"]:
-    """Moments of the motion, one for each new frame, with four stretches of other speed each.
+    """Moments of the motion, one for each new frame, at speeds that change along the clip.
 
-    Speeds are log-uniform in `RATES` and change gradually, so that no frame jumps.
+    Speeds at four moments are log-uniform in `RATES` and change gradually between them, so that no
+    frame jumps.
     """
     knots = np.linspace(times[0], times[-1], 4)
     slowness = 1.0 / np.exp(generator.uniform(*np.log(RATES), len(knots)))
@@ -88,26 +80,19 @@ def warp_times(
 
 
 def _clip(
-    spec: MotionSpec,
-    body_name: str,
-    flip: bool,
-    variant: int,
-    interaction: str,
-    generator: np.random.Generator,
+    source: PoseClip, warped: bool, interaction: str, generator: np.random.Generator
 ) -> TrainingClip:
-    motion = load_motion(spec.motion_id, body_name)
-    motion = mirror(motion) if flip else motion
-    if variant:
+    motion, held_out = source.motion, source.split == "test"
+    if warped and not held_out:
         motion = at_times(motion, warp_times(motion.times, generator), FPS)
+    if motion.n_frames > MOST_FRAMES:
+        start = int(generator.integers(motion.n_frames - MOST_FRAMES + 1))
+        motion = window(motion, start, start + MOST_FRAMES)
     classes = SCENE_CLASSES[int(generator.integers(len(SCENE_CLASSES)))]
-    inputs, cues = clip_parts(motion, interaction, classes, generator)
-    return TrainingClip(
-        name=f"{spec.motion_id} {'mirrored ' if flip else ''}{variant} {body_name}",
-        motion_id=spec.motion_id,
-        captured="authored" not in spec.source or "DeepMimic" in spec.source,
-        inputs=inputs,
-        cues=cues,
+    inputs, cues = clip_parts(
+        dataclasses.replace(motion, body=source.body), interaction, classes, generator
     )
+    return TrainingClip(source.name, source.kind == "captured", held_out, inputs, cues)
 
 
 def clip_parts(

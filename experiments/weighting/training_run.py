@@ -42,7 +42,7 @@ def run_training(
             "held_out": sum(clip.n_frames for clip in test),
         },
         "parameters": sum(value.numel() for value in run.network.parameters()),
-        "held_out": held_out_report(run.network, test),
+        "held_out": held_out_report(run.network, clips),
     }
     write_json(folder / "report.json", report)
     return report

@@ -84,3 +84,16 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 def test_motions_dir_is_relative_to_the_configuration(tmp_path: Path) -> None:
     path = _write(tmp_path, motions="", motions_dir='"mine"')
     assert read_config(path).motions_dir == str((tmp_path / "mine").resolve())
+
+
+def test_the_comparison_places_twelve_motions_or_more_in_the_four_test_rooms() -> None:
+    from experiments.methods import METHODS
+    from experiments.pipeline import validate_names
+    from experiments.scene.rooms import TEST_ROOMS
+
+    config = read_config(CONFIGS / "ablation.toml")
+    validate_names(config)
+    assert set(config.scenes) == set(TEST_ROOMS) and len(config.motions) >= 12
+    assert set(config.methods) == set(METHODS) - {"synthesis"}
+    assert (config.placement.preset, config.placement.full_motions) == ("fast", 2)
+    assert config.other_methods_motions == 0

@@ -90,6 +90,12 @@ def test_a_score_that_some_clips_lack_is_the_mean_of_the_others() -> None:
     assert means([_row("pace", cv2=0.4), _row("pace")])["cv2"] == 0.4
 
 
+def test_the_jerk_ratio_is_that_of_the_means_not_the_mean_of_ratios() -> None:
+    still = {"jerk_before_mm": 0.1, "jerk_change_mm": 0.9, "jerk_ratio": 10.0}
+    lively = {"jerk_before_mm": 1.9, "jerk_change_mm": 0.1, "jerk_ratio": 2.0 / 1.9}
+    assert means([_row("pace", **still), _row("pace", **lively)])["jerk_ratio"] == pytest.approx(1.5)
+
+
 def test_a_case_that_one_study_method_missed_counts_for_none(rows) -> None:
     kept = kept_rows(rows)
     assert {(row["scene"], row["motion"]) for row in rows} - {
