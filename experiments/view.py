@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Int16
+from jaxtyping import Float, Int16
 
 from experiments.body.embedded import load_body
 from experiments.body.rig import Rig, helper_rig
 from experiments.body.skinned_body import SkinnedBody
 from experiments.body.surface import vertex_normals
+from experiments.clips import skinned
 from experiments.methods import METHODS
 from experiments.motion.motion import Motion
 from experiments.motion.rotations import to_quaternion
@@ -24,10 +25,13 @@ from experiments.scene.baking import load_room
 from experiments.scene.lookup import SceneLookup
 from experiments.scene.scene import Scene
 from experiments.scene.stage_parts import stage_parts
+from renderer.cameras import choose_cameras
 from renderer.files import InputError
 from renderer.gltf import UNMARKED, SkinnedMesh, skinned_glb
 from renderer.gltf_room import room_glb
-from renderer.viewer.page import ViewerBody, ViewerPage, write_page
+from renderer.settings import RenderSettings
+from renderer.stage import StagePart
+from renderer.viewer.page import ViewerBody, ViewerCamera, ViewerPage, write_page
 
 TOLERANCE_MM = 10.0
 """Within this distance of a surface a vertex touches; deeper inside it penetrates."""
@@ -77,6 +81,7 @@ def view_placements(
         tolerance_mm=tolerance_mm,
         room=room_glb(parts),
         bodies=tuple(bodies),
+        views=_views(placements, scene, parts),
     )
     return write_page(page, out)
 
@@ -140,6 +145,30 @@ def _viewer_body(
     marks = skin_marks(placement.motion, scene, tolerance_mm)
     mesh, error = body_mesh(placement.motion, key, marks)
     return ViewerBody(key, label, skinned_glb(mesh), error.p99_mm, error.max_mm)
+
+
+def _views(
+    placements: Sequence[Placement], scene: Scene, parts: Sequence[StagePart]
+) -> tuple[ViewerCamera, ...]:
+    """The four cameras that a clip of these placements would have, the best seen first."""
+    body = load_body(placements[0].motion.body)
+    bodies = [skinned(load_body(p.motion.body), p.motion) for p in placements]
+    rig = choose_cameras(
+        parts, scene.room_size, scene.floor_z, bodies, body.regions, body.faces, RenderSettings()
+    )
+    swept = np.concatenate([vertices.reshape(-1, 3) for vertices in bodies])
+    centre = 0.5 * (swept.min(0) + swept.max(0)).astype(np.float64)
+    views = sorted(rig.views, key=lambda view: view != rig.best())
+    return tuple(_camera(view.matrix, view.azimuth_deg, centre) for view in views)
+
+
+def _camera(
+    pose: Float[np.ndarray, "4 4"], azimuth_deg: float, centre: Float[np.ndarray, "3"]
+) -> ViewerCamera:
+    eye, forward = pose[:3, 3], -pose[:3, 2]
+    target = eye + forward * float((centre - eye) @ forward)
+    compass = ("E", "NE", "N", "NW", "W", "SW", "S", "SE")[round(azimuth_deg / 45) % 8]
+    return ViewerCamera(compass, tuple(eye.tolist()), tuple(target.tolist()))
 
 
 def _mesh_of(

@@ -70,13 +70,15 @@ def skinned_glb(mesh: SkinnedMesh) -> bytes:
     _refuse_bad_numbers(mesh)
     glb = Glb()
     joint_count = len(mesh.joint_names)
-    body_node, first_joint = 1, 2
-    nodes: list[dict[str, Any]] = [
-        {"name": "z_up", "rotation": Z_UP_TO_Y_UP, "children": [body_node, first_joint]},
+    skeleton_node, body_node, first_joint = 0, 1, 2
+    glb.put(
+        "nodes",
+        {"name": "z_up", "rotation": Z_UP_TO_Y_UP, "children": [first_joint]},
         {"name": mesh.name, "mesh": 0, "skin": 0},
         *_joint_nodes(mesh, first_joint),
-    ]
-    glb.put("nodes", *nodes)
+    )
+    # A skinned mesh follows its joints alone, so the format wants its node to have no parent.
+    glb.put("scenes", {"nodes": [skeleton_node, body_node]})
     glb.put("meshes", _mesh(glb, mesh))
     glb.put("materials", matt_material(None, mesh.colour))
     glb.put(
@@ -96,7 +98,7 @@ class Glb:
 
     def __init__(self) -> None:
         self.data = bytearray()
-        self.tables: dict[str, list[dict[str, Any]]] = {"scenes": [{"nodes": [0]}]}
+        self.tables: dict[str, list[dict[str, Any]]] = {}
 
     def put(self, table: str, *entries: dict[str, Any]) -> int:
         """Append entries to a table; returns the index of the first."""

@@ -40,6 +40,7 @@ def room_glb(parts: Sequence[StagePart]) -> bytes:
     for index, part in enumerate(parts):
         members[part.group].append(first_part + index)
     walls = {part.group: part.wall for part in parts}
+    glb.put("scenes", {"nodes": [0]})
     glb.put(
         "nodes",
         {"name": "room", "rotation": Z_UP_TO_Y_UP, "children": list(range(1, first_part))},
@@ -68,6 +69,9 @@ def _mesh(glb: Glb, part: StagePart, material: int) -> dict[str, Any]:
         name: glb.accessor(rows[first], ARRAY_BUFFER, rows.dtype.kind == "u")
         for name, rows in columns.items()
     }
+    triangles = index.reshape(-1, 3)
+    lines = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
+    index = triangles[~lines].reshape(-1)
     indices = glb.accessor(smallest_indices(index), ELEMENT_ARRAY_BUFFER)
     return {"primitives": [{"attributes": attributes, "indices": indices, "material": material}]}
 

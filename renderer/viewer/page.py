@@ -8,6 +8,7 @@ licence, unmodified; the page compresses it and gives its modules their addresse
 from __future__ import annotations
 
 import base64
+import dataclasses
 import gzip
 import html
 import json
@@ -42,6 +43,15 @@ class ViewerBody:
 
 
 @dataclass(frozen=True)
+class ViewerCamera:
+    """A camera to start from; metres, z up, 32 degrees high, 16:9."""
+
+    label: str
+    eye: tuple[float, float, float]
+    target: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
 class ViewerPage:
     """What the page shows. Room box [0, W] x [0, D] x [floor_z, floor_z + H], metres, z up."""
 
@@ -55,6 +65,8 @@ class ViewerPage:
     tolerance_mm: float
     room: bytes
     bodies: tuple[ViewerBody, ...]
+    views: tuple[ViewerCamera, ...] = ()
+    """Offered as buttons; the first is where the page opens."""
 
 
 def write_page(page: ViewerPage, out: Path) -> dict[str, Any]:
@@ -120,6 +132,7 @@ def _index(page: ViewerPage) -> bytes:
         scene_label=html.escape(page.scene_label),
         motion_label=html.escape(page.motion_label),
         methods="\n".join(_choice(number, body) for number, body in enumerate(page.bodies, 1)),
+        views="\n".join(_view_button(index, view) for index, view in enumerate(page.views)),
         tolerance=f"{page.tolerance_mm:g}",
         last_frame=str(page.n_frames - 1),
         style=_asset("viewer.css").decode(),
@@ -135,6 +148,11 @@ def _choice(number: int, body: ViewerBody) -> str:
         f'    <label><input type="radio" name="method" value="{key}"{mark}>'
         f'<span class="name">{html.escape(body.label)}{shortcut}</span></label>'
     )
+
+
+def _view_button(index: int, view: ViewerCamera) -> str:
+    label = html.escape(view.label)
+    return f'      <button type="button" data-view="{index}" title="Look from {label} (V)">{label}</button>'
 
 
 def _filled(template: str, **values: str) -> str:
@@ -164,6 +182,7 @@ def _manifest(page: ViewerPage) -> dict[str, Any]:
             }
             for body in page.bodies
         ],
+        "views": [dataclasses.asdict(view) for view in page.views],
         "light": {
             "key_travels": light.light_direction(
                 light.KEY_AZIMUTH_DEG, light.KEY_ELEVATION_DEG

@@ -23,7 +23,7 @@ class Viewer {
     Object.assign(this, { manifest, data });
     this.clock = new Clock(manifest.n_frames, manifest.fps);
     this.bodies = manifest.bodies.map((about) => this.#readBody(about));
-    this.shown = 0;
+    [this.shown, this.view] = [0, 0];
     Object.assign(this, { overlay: false, ghosts: false, follow: false });
   }
 
@@ -44,7 +44,7 @@ class Viewer {
     this.#setTheme();
     this.show(this.shown);
     this.stage.resize(byId("view").clientWidth, byId("view").clientHeight);
-    this.resetView();
+    this.look(this.view);
     this.#draw();
     const loop = () => {
       this.clock.tick();
@@ -97,19 +97,20 @@ class Viewer {
     this.refresh();
   }
 
-  /** Frame all that the bodies sweep through. */
+  /** The first view of the clips; a page without any frames the whole room. */
   resetView() {
-    const box = new Box3();
-    for (const body of this.bodies) {
-      for (let i = 0; i < 5; i++) {
-        const [x0, y0, z0, x1, y1, z1] = body.skin.pose(((this.clock.frames - 1) * i) / 4).bounds;
-        box.union(new Box3(new Vector3(x0, y0, z0), new Vector3(x1, y1, z1)));
-      }
+    this.look(0);
+  }
+
+  look(index) {
+    const { views, room_size: [width, depth, height] } = this.manifest;
+    this.view = index;
+    if (this.follow) this.setFollow(false);
+    if (views[index]) {
+      this.stage.look(new Vector3(...views[index].eye), new Vector3(...views[index].target));
+    } else {
+      this.stage.frame(new Box3(new Vector3(0, 0, 0), new Vector3(width, depth, Math.min(height, 1.8))));
     }
-    const [width, depth, height] = this.manifest.room_size;
-    const room = new Box3(new Vector3(0, 0, 0), new Vector3(width, depth, Math.min(height, 1.8)));
-    this.stage.frame(box.isEmpty() ? room : box.expandByScalar(0.25));
-    this.refresh();
   }
 
   /** Pose, paint and draw again at the next chance. */
@@ -187,6 +188,7 @@ class Viewer {
     press("ghosts", () => this.setGhosts(!this.ghosts));
     press("follow", () => this.setFollow(!this.follow));
     press("reset", () => this.resetView());
+    all("#views button").forEach((button, i) => button.addEventListener("click", () => this.look(i)));
     press("picture", () => this.#savePicture());
     byId("scrub").addEventListener("input", (event) => clock.seek(Number(event.target.value)));
     byId("speed").addEventListener("change", (event) => (clock.speed = Number(event.target.value)));
@@ -215,6 +217,7 @@ class Viewer {
       g: () => this.setGhosts(!this.ghosts),
       f: () => this.setFollow(!this.follow),
       r: () => this.resetView(),
+      v: () => this.look((this.view + 1) % Math.max(1, this.manifest.views.length)),
       x: () => this.setWalls(WALL_MODES[(WALL_MODES.indexOf(this.room.mode) + 1) % WALL_MODES.length]),
     };
     const digit = /^[1-9]$/.test(event.key) ? () => this.show(Number(event.key) - 1) : null;
@@ -234,6 +237,7 @@ class Viewer {
     if (index >= 0) this.shown = index;
     if (/^\d+$/.test(wanted.get("frame") ?? "")) this.clock.seek(Number(wanted.get("frame")));
     if (WALL_MODES.includes(wanted.get("walls"))) this.setWalls(wanted.get("walls"));
+    if (/^\d$/.test(wanted.get("view") ?? "")) this.view = Number(wanted.get("view"));
     if (wanted.get("overlay") === "1") this.setOverlay(true);
     if (wanted.get("ghosts") === "1") this.setGhosts(true);
   }
@@ -283,6 +287,7 @@ class Viewer {
         overlay: this.overlay,
         ghosts: this.ghosts,
         follow: this.follow,
+        view: this.view,
         walls: this.room.mode,
         visible: this.room.groups.filter((group) => group.visible).map((group) => group.name),
         faded: this.room.groups

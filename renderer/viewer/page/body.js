@@ -8,7 +8,7 @@ export const CONTACT = new Color("#00a878");
 export const SHALLOW = new Color("#ff9d2e");
 export const DEEP = new Color("#d40032");
 export const DEEP_MM = 60; // the ramp of penetration ends here
-const PALE = new Color(0.78, 0.79, 0.8); // the body under the overlay, so that marks stand out
+const PALE = new Color(0.5, 0.51, 0.53); // the body under the overlay, so that marks stand out
 
 export class Body {
   constructor(skin, marks, about) {
@@ -21,7 +21,8 @@ export class Body {
     this.geometry.setAttribute("color", dynamic(new Float32Array(3 * skin.count)));
     this.solid = new MeshStandardMaterial({ vertexColors: true, roughness: 0.85, metalness: 0 });
     this.ghost = new MeshStandardMaterial({
-      color: "#8a93a0", roughness: 1, transparent: true, opacity: 0.28, depthWrite: false,
+      color: "#8a93a0", roughness: 1, transparent: true, opacity: 0.3, depthWrite: false,
+      polygonOffset: true, polygonOffsetFactor: 6, polygonOffsetUnits: 40, // gives way where bodies coincide
     });
     this.mesh = new Mesh(this.geometry, this.solid);
     this.mesh.frustumCulled = false;

@@ -5,7 +5,7 @@ import {
 } from "three";
 
 export const WALL_MODES = ["cutaway", "xray", "solid"];
-const XRAY_OPACITY = 0.16;
+const XRAY_OPACITY = { wall: 0.14, thing: 0.3 };
 const ROUND_EYE = 0.1; // metres: a wall this close to the eye counts as in front of the room
 
 export class Room {
@@ -20,11 +20,12 @@ export class Room {
     this.groups = [];
     this.mode = "cutaway";
     const solid = glb.json.materials.map((material) => roomMaterial(material, textures));
-    const xray = solid.map((material) => seeThrough(material));
+    const [wallXray, thingXray] = ["wall", "thing"].map((kind) => solid.map((material) => seeThrough(material, kind)));
     for (const index of glb.json.nodes[0].children) {
       const node = glb.json.nodes[index];
       const group = new Group();
       group.name = node.name;
+      const xray = node.extras.wall === null ? thingXray : wallXray;
       for (const child of node.children) {
         const part = glb.json.nodes[child];
         const primitive = glb.json.meshes[part.mesh].primitives[0];
@@ -101,9 +102,9 @@ function roomMaterial(described, textures) {
   return occluded(new MeshLambertMaterial({ vertexColors: true, map }));
 }
 
-function seeThrough(material) {
+function seeThrough(material, kind) {
   const faded = occluded(material.clone());
-  Object.assign(faded, { transparent: true, opacity: XRAY_OPACITY, depthWrite: false });
+  Object.assign(faded, { transparent: true, opacity: XRAY_OPACITY[kind], depthWrite: false });
   return faded;
 }
 

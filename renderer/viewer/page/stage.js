@@ -74,6 +74,15 @@ export class Stage {
     this.dirty = true;
   }
 
+  /** Stand at an eye that was made for a picture of 16:9; a narrower picture stands further back. */
+  look(eye, target) {
+    const back = Math.min(1.6, Math.max(1, 16 / 9 / this.camera.aspect));
+    this.controls.target.copy(target);
+    this.camera.position.copy(target).addScaledVector(eye.clone().sub(target), back);
+    this.controls.update();
+    this.dirty = true;
+  }
+
   /** Move eye and target together. */
   shift(by) {
     this.camera.position.add(by);
