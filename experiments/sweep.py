@@ -15,7 +15,23 @@ from pathlib import Path
 from typing import Any
 
 import click
+import torch
+from rich.console import Console
+from rich.progress import track
 
+from experiments.body.embedded import load_body
+from experiments.methods.ablations import place_variant
+from experiments.methods.pace import place_altered
+from experiments.methods.preparation import prepare
+from experiments.methods.rigid import rigid_fits
+from experiments.metrics import plausibility
+from experiments.motion.library import load_motion, trim
+from experiments.placement.errors import PlacementError
+from experiments.placement.placement import Placement
+from experiments.placement.problem import Problem
+from experiments.placement.settings import PRESETS, PlacementSettings
+from experiments.placement.solver import Fit
+from experiments.scene.baking import load_room
 from renderer.files import InputError, atomic_path
 
 CASES: tuple[tuple[str, str], ...] = (
@@ -82,6 +98,10 @@ _TERMS = (
 )  # fmt: skip
 
 
+_SCENE_FIELDS = ("contact_tolerance", "huber_widths", "contact_threshold")
+"""Settings that the rigid fits depend on; all others share them."""
+
+
 def sweep_rows(
     settings: Sequence[Setting], cases: Sequence[tuple[str, str]], base: Mapping[str, Any]
 ) -> Iterator[dict[str, Any]]:
@@ -89,41 +109,52 @@ def sweep_rows(
 
     `base` changes every setting alike.
     """
-    from experiments.body.embedded import load_body
-    from experiments.motion.library import load_motion, trim
-    from experiments.scene.baking import load_room
-
-    body = load_body("male_slim")
     for motion_id, room in cases:
-        motion, scene = trim(load_motion(motion_id), SECONDS), load_room(room)
+        case = _Case(motion_id, room)
         for name, method, changes in settings:
             row = {"setting": name, "motion": motion_id, "room": room, "failure": ""}
-            yield row | _result(motion, scene, body, method, {**base, **changes})
+            yield row | case.result(method, {**base, **changes})
 
 
-def _result(
-    motion: Any, scene: Any, body: Any, method: str, changes: Mapping[str, Any]
-) -> dict[str, Any]:
-    from experiments.methods import METHODS
-    from experiments.metrics import plausibility
-    from experiments.placement.errors import PlacementError
-    from experiments.placement.settings import PRESETS
+class _Case:
+    """One motion in one room; the rigid fits that settings share are found once."""
 
-    settings = dataclasses.replace(PRESETS["fast"], **changes)
-    try:
-        placement = METHODS[method].place(motion, scene, body, settings, 0)
-    except PlacementError as error:
-        return {"failure": error.reason}
-    scores = plausibility(placement.motion, motion, scene, body, settings).as_dict()
-    terms = {f"E_{name}": placement.terms.get(name, 0.0) for name in _TERMS}
-    chosen = placement.info["chosen_start"]
-    return {
-        **terms,
-        **{name: scores[name] for name in _SCORES if name in scores},
-        "E_rigid": placement.info["rigid_energies"][chosen],
-        "evaluations": placement.info["evaluations"],
-        "optimiser": placement.info.get("optimiser", "reached"),
-    }
+    def __init__(self, motion_id: str, room: str) -> None:
+        self._motion, self._scene = trim(load_motion(motion_id), SECONDS), load_room(room)
+        self._body = load_body("male_slim")
+        self._begun: dict[tuple[Any, ...], tuple[Problem, list[Fit]]] = {}
+
+    def result(self, method: str, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """Energy, scores and effort of one setting; the reason if there is no placement."""
+        settings = dataclasses.replace(PRESETS["fast"], **changes)
+        try:
+            placement = self._place(method, settings)
+        except PlacementError as error:
+            return {"failure": error.reason}
+        scores = plausibility(
+            placement.motion, self._motion, self._scene, self._body, settings
+        ).as_dict()
+        chosen = placement.info["chosen_start"]
+        return {
+            **{f"E_{name}": placement.terms.get(name, 0.0) for name in _TERMS},
+            **{name: scores[name] for name in _SCORES if name in scores},
+            "E_rigid": placement.info["rigid_energies"][chosen],
+            "evaluations": placement.info["evaluations"],
+            "optimiser": placement.info.get("optimiser", "reached"),
+        }
+
+    def _place(self, method: str, settings: PlacementSettings) -> Placement:
+        key = (settings.interaction, *(getattr(settings, name) for name in _SCENE_FIELDS))
+        if key not in self._begun:
+            problem = prepare(self._motion, self._scene, self._body, settings, 0)
+            self._begun[key] = problem, rigid_fits(problem)
+        problem, rigid = self._begun[key]
+        problem = dataclasses.replace(problem, settings=settings)
+        if method == "pace":
+            return place_altered(problem, rigid, method, 0)
+        return place_variant(
+            problem, rigid, "lambda_pose" if method == "pace_no_pose" else "lambda_mot", 0
+        )
 
 
 _SHOWN: tuple[tuple[str, str, int], ...] = (
@@ -171,9 +202,7 @@ def _mean(rows: Sequence[Mapping[str, Any]], key: str, decimals: int) -> str:
 @click.option("--case", "cases", multiple=True, help="MOTION:ROOM, may be repeated.")
 def main(sweep: str, out: Path, interaction: str | None, cases: Sequence[str]) -> None:
     """Run SWEEP on the training rooms and write SWEEP.csv and SWEEP.md."""
-    from rich.console import Console
-    from rich.progress import track
-
+    torch.set_num_threads(1)
     chosen = [_case(text) for text in cases] or list(CASES)
     base = {"interaction": interaction} if interaction else {}
     found = sweep_rows(SWEEPS[sweep], chosen, base)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
+from collections.abc import Sequence
 from functools import partial
 from typing import Literal
 
@@ -37,15 +38,20 @@ def pace_without(
     settings: PlacementSettings,
     seed: int,
 ) -> Placement:
-    """An ablation: PACE with one weight of E_alt set to zero, everything else alike.
+    """An ablation: PACE with one weight of E_alt set to zero. Raises `PlacementError`."""
+    problem = prepare(motion, scene, body, settings, seed)
+    return place_variant(problem, rigid_fits(problem), weight, seed)
+
+
+def place_variant(problem: Problem, rigid: Sequence[Fit], weight: Weight, seed: int) -> Placement:
+    """The answer of an ablation, given the rigid fits that it and PACE begin at.
 
     The starts are altered by the full method first, and the variant keeps its change of variables.
     `info["optimiser"]` is "failed" if the fit it answers with ended above what PACE reached in the
     variant's energy, and `info["runs"]` counts which run of each start reached it.
     """
-    problem = prepare(motion, scene, body, settings, seed)
-    pairs = alter_best(problem, rigid_fits(problem))
-    found = [fit_variant(problem, rigid, full, weight) for rigid, full in pairs]
+    pairs = alter_best(problem, rigid)
+    found = [fit_variant(problem, start, full, weight) for start, full in pairs]
     name = "pace_no_pose" if weight == "lambda_pose" else "pace_no_motion"
     runs = dict(Counter(outcome for _, outcome in found))
     placement = to_placement(

@@ -15,6 +15,7 @@ from experiments.motion.motion import Motion
 from experiments.placement.bones import bone_points
 from experiments.placement.candidates import Starts, class_match
 from experiments.placement.errors import NoAdmissibleStart, OptimisationFailed
+from experiments.placement.optimiser import FAILED
 from experiments.placement.placement import Placement
 from experiments.placement.problem import Problem
 from experiments.placement.rigid import move, move_motion
@@ -25,7 +26,7 @@ from experiments.placement.spread import spread_alteration
 def best_fit(problem: Problem, fits: Sequence[Fit]) -> Fit:
     """The fit of lowest energy that touches what it expects and is not deep inside something.
 
-    Raises `NoAdmissibleStart` if there is none, `OptimisationFailed` if no energy is finite.
+    Raises `NoAdmissibleStart` if there is none, `OptimisationFailed` if every optimisation broke.
     """
     motion, scene = problem.motion.motion_id, problem.scene.scene_id
     finite = [fit for fit in fits if math.isfinite(fit.energy)]
@@ -33,6 +34,8 @@ def best_fit(problem: Problem, fits: Sequence[Fit]) -> Fit:
         raise OptimisationFailed(motion, scene, "no start reached a finite energy")
     faults = [fault(problem, fit) for fit in finite]
     sound = [fit for fit, found in zip(finite, faults, strict=True) if not found]
+    if not sound and all(fit.reason in FAILED for fit in finite):
+        raise OptimisationFailed(motion, scene, f"no start was optimised: {finite[0].reason}")
     if not sound:
         raise NoAdmissibleStart(motion, scene, f"at its best start the body {faults[0]}")
     return min(sound, key=lambda fit: fit.energy)
@@ -41,6 +44,8 @@ def best_fit(problem: Problem, fits: Sequence[Fit]) -> Fit:
 def fault(problem: Problem, fit: Fit) -> str:
     """What is wrong with a fit by the settings' own limits, in words; empty if nothing."""
     settings = problem.settings
+    if fit.reason in FAILED:
+        return f"cannot be followed: its optimisation ended as {fit.reason}"
     if settings.max_depth is not None:
         depth = deepest_vertex(problem, fit)
         if depth > settings.max_depth:
@@ -134,6 +139,13 @@ def to_placement(
             "iterations": sum(item.iterations for item in fits),
             "stopped": fit.reason,
             "trace": list(fit.trace),
+            "history": list(fit.history),
+            "broken_starts": [
+                {"start": index, "reason": item.reason}
+                for index, item in enumerate(fits)
+                if item.reason in FAILED
+            ],
+            "semantics_off": problem.field.semantics_off,
             "centre": centre.tolist(),
             **info,
         },

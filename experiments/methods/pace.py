@@ -24,12 +24,12 @@ def pace(
     One energy over all variables; the frame weights are PAAK's. Raises `PlacementError`.
     """
     problem = prepare(motion, scene, body, settings, seed)
-    return place_altered(problem, "pace", seed)
+    return place_altered(problem, rigid_fits(problem), "pace", seed)
 
 
-def place_altered(problem: Problem, method: str, seed: int) -> Placement:
-    """The answer of a method that alters the motion."""
-    pairs = alter_best(problem, rigid_fits(problem))
+def place_altered(problem: Problem, rigid: Sequence[Fit], method: str, seed: int) -> Placement:
+    """The answer of a method that alters the motion, given the rigid fits it begins at."""
+    pairs = alter_best(problem, rigid)
     return to_placement(problem, [fit for _, fit in pairs], method, seed, rigid_energies(pairs))
 
 

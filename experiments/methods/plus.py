@@ -15,7 +15,7 @@ from experiments.methods.paak import paak_weights
 from experiments.methods.pace import place_altered
 from experiments.methods.posa_t import alike
 from experiments.methods.preparation import prepare
-from experiments.methods.rigid import place_rigid
+from experiments.methods.rigid import place_rigid, rigid_fits
 from experiments.motion.motion import Motion
 from experiments.placement.placement import Placement
 from experiments.placement.settings import PlacementSettings
@@ -47,7 +47,7 @@ def pace_plus(
 ) -> Placement:
     """PACE with the scene terms of this block and a steady alteration. Raises `PlacementError`."""
     problem = prepare(motion, scene, body, settings, seed, energy=plus_settings(settings))
-    return place_altered(problem, "pace_plus", seed)
+    return place_altered(problem, rigid_fits(problem), "pace_plus", seed)
 
 
 def plus_settings(settings: PlacementSettings) -> PlacementSettings:
