@@ -36,6 +36,7 @@ def comparison_markdown(evaluation: dict[str, Any]) -> str:
     parts += _block(_of(methods, "paper"), "The paper's methods", published=True)
     parts += _ablations(methods)
     parts += _block(_of(methods, "plus"), "With the scene terms of ours (plus)")
+    parts += [plus_sentence(methods)]
     parts += ["## By class of motion", _classes(methods)]
     if "full" in evaluation:
         full = evaluation["full"]
@@ -74,6 +75,25 @@ def collision_sentence(methods: dict[str, Method]) -> str:
         f"1 cm differ by {deep:+.4f}. {best['display_name']} keeps everything more than 1 cm away in "
         f"{floating:.0%} of the frames, PACE in {1.0 - pace['contact_1cm']:.0%}."
     )
+
+
+def plus_sentence(methods: dict[str, Method]) -> str:
+    """Whether PACE+ lies above the rigid methods with printed terms in contact, and not below in
+    non-collision. Other scene terms: it says what the terms bring, not which method is better."""
+    if not _has(methods, "pace_plus"):
+        return ""
+    plus, parts = methods["pace_plus"], []
+    for name in ("posa_t", "paak"):
+        if _has(methods, name):
+            other = methods[name]
+            touch = "above" if plus["contact"] > other["contact"] else "NOT above"
+            free = "not below" if plus["non_collision"] >= other["non_collision"] else "BELOW"
+            parts.append(
+                f"{other['display_name']} (printed terms): contact {plus['contact']:.3f} is {touch} "
+                f"{other['contact']:.3f}, non-collision {plus['non_collision']:.4f} is {free} "
+                f"{other['non_collision']:.4f}"
+            )
+    return f"PACE+ against {'; '.join(parts)}." if parts else ""
 
 
 def _block(methods: dict[str, Method], title: str, published: bool = False) -> list[str]:

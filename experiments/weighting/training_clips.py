@@ -48,17 +48,18 @@ class TrainingClip:
 def build_clips(
     interaction: str, seed: int, progress: Callable[[int, int], None] = lambda *_: None
 ) -> list[TrainingClip]:
-    """Recorded and authored clips, four bodies in turn; of training clips two thirds, half of them
-    time-warped, because the pool has each in three versions that look alike.
+    """Recorded and authored clips, four bodies in turn; every other training clip is time-warped.
 
-    The split is that of the pose pool, by clip: what the interaction model never saw is held out
-    here too. CMU recordings are used where the folder `PACE_SHARED` has them.
+    The pool has each clip in three versions that look alike: of authored ones one is taken, of
+    recorded ones two. The split is that of the pool, by clip: what the interaction model never saw
+    is held out here too. CMU recordings are used where the folder `PACE_SHARED` has them.
     """
     generator = np.random.default_rng([seed, 1])
     clips: list[TrainingClip] = []
     for index, source in enumerate(pose_pool(np.random.default_rng([seed, 0]))):
-        if source.split == "test" or index % 3 != 2:
-            clips.append(_clip(source, index % 3 == 1, interaction, generator))
+        versions = (0, 1) if source.kind == "captured" else (0,)
+        if source.split == "test" or index % 3 in versions:
+            clips.append(_clip(source, len(clips) % 2 == 1, interaction, generator))
         progress(index + 1, pool_size())
     return clips
 

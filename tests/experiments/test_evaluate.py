@@ -21,7 +21,11 @@ from experiments.comparison import (
     paired,
     pooled,
 )
-from experiments.comparison_table import collision_sentence, comparison_markdown
+from experiments.comparison_table import (
+    collision_sentence,
+    comparison_markdown,
+    plus_sentence,
+)
 from experiments.config import PlacementConfig, StimulusSetConfig
 from experiments.evaluate import (
     compared,
@@ -93,7 +97,9 @@ def test_a_score_that_some_clips_lack_is_the_mean_of_the_others() -> None:
 def test_the_jerk_ratio_is_that_of_the_means_not_the_mean_of_ratios() -> None:
     still = {"jerk_before_mm": 0.1, "jerk_change_mm": 0.9, "jerk_ratio": 10.0}
     lively = {"jerk_before_mm": 1.9, "jerk_change_mm": 0.1, "jerk_ratio": 2.0 / 1.9}
-    assert means([_row("pace", **still), _row("pace", **lively)])["jerk_ratio"] == pytest.approx(1.5)
+    assert means([_row("pace", **still), _row("pace", **lively)])["jerk_ratio"] == pytest.approx(
+        1.5
+    )
 
 
 def test_a_case_that_one_study_method_missed_counts_for_none(rows) -> None:
@@ -230,6 +236,16 @@ def test_the_sentence_tells_vertices_astride_the_surface_from_bodies_inside_thin
     assert "0.0090 are vertices less than 1 cm deep" in collision_sentence(_methods(rigid, astride))
     assert "deeper inside things" in collision_sentence(_methods(rigid, inside))
     assert "is not lower" in collision_sentence(_methods(rigid, above))
+
+
+def test_a_plus_method_that_misses_is_reported_as_a_miss() -> None:
+    methods = _methods(
+        {"non_collision": 0.97, "contact": 0.8}, {"non_collision": 0.98, "contact": 1.0}
+    )
+    methods["pace_plus"] = {"clips": 3, "non_collision": 0.96, "contact": 0.9}
+    found = plus_sentence(methods)
+    assert "contact 0.900 is above 0.800" in found
+    assert "non-collision 0.9600 is BELOW 0.9700" in found
 
 
 def test_the_fuller_preset_is_for_the_first_motions_and_the_study_methods() -> None:
