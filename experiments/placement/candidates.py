@@ -107,7 +107,7 @@ def coarse_best(problem: Problem, starts: Starts) -> float:
 def _admissible(problem: Problem, starts: Starts) -> Starts:
     """Starts that bring the body to what it expects to touch and no bone through anything."""
     threshold = problem.settings.start_filter
-    if threshold is not None and not problem.field.semantics_off:
+    if threshold is not None:
         matching = class_match(problem, starts) >= threshold
         if not matching.any():
             names = ", ".join(problem.expected_classes(floor=True))
@@ -185,8 +185,10 @@ def class_match(problem: RigidProblem, starts: Starts) -> Float[np.ndarray, " N"
     Floor and everything else are counted apart and the lower share is the answer, because soles
     outnumber a seat; one where the motion expects nothing. Uses `coarse_frames` frames.
     """
-    beyond = problem.beyond_floor()
     match = np.ones(len(starts))
+    if problem.field.semantics_off:
+        return match
+    beyond = problem.beyond_floor()
     for group in (beyond, problem.contact & ~beyond):
         frames = np.flatnonzero(group.any(1))
         if len(frames) == 0:

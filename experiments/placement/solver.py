@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -40,11 +41,15 @@ class Fit:
     iterations: int = 0
     reason: str = ""
     trace: tuple[float, ...] = ()
+    """Energy at the start of every outer step and at the end, with the rounded penalty."""
+    history: tuple[dict[str, float], ...] = ()
+    """The terms, as in `terms`, at the start and after every outer step."""
 
     @property
     def energy(self) -> float:
-        """E = E_p + E_alt."""
-        return sum(self.terms.values())
+        """E = E_p + E_alt; infinite where it is not a number, so that it loses every comparison."""
+        value = sum(self.terms.values())
+        return math.inf if math.isnan(value) else value
 
 
 def fit_rigid(problem: Problem, yaw: float, translation: Float[np.ndarray, "3"]) -> Fit:
@@ -62,7 +67,10 @@ def fit_rigid(problem: Problem, yaw: float, translation: Float[np.ndarray, "3"])
     def fit(rigid: Float[Tensor, "4"]) -> Fit:
         return _fit(problem, rigid, _unaltered(problem), problem.settings)
 
-    minimum = _minimise(problem, energy, torch.zeros(4, dtype=origin.dtype), None)
+    def describe(state: Float[Tensor, " N"]) -> dict[str, float]:
+        return fit(origin + scale * state).terms
+
+    minimum = _minimise(problem, energy, torch.zeros_like(origin), None, describe)
     # The rounded penalty is minimised, the printed one decides: never answer worse than the start.
     best = min(fit(origin + scale * minimum.state), fit(origin), key=lambda item: item.energy)
     return _counted(best, minimum)
@@ -96,11 +104,15 @@ def fit_altered(
 
         return value
 
-    minimum = _minimise(problem, energy, variables.start(), give_up_above)
-    placed, delta, shift = variables.decode(minimum.state)
-    found = _fit(problem, placed, (delta, shift), weights)
+    def fit(state: Float[Tensor, " N"]) -> Fit:
+        placed, delta, shift = variables.decode(state)
+        return _fit(problem, placed, (delta, shift), weights)
+
+    minimum = _minimise(
+        problem, energy, variables.start(), give_up_above, lambda state: fit(state).terms
+    )
     before = _fit(problem, _rigid_tensor(problem, rigid), (rigid.delta, rigid.shift), weights)
-    return _counted(min(found, before, key=lambda item: item.energy), minimum)
+    return _counted(min(fit(minimum.state), before, key=lambda item: item.energy), minimum)
 
 
 def altered_bodies(
@@ -150,6 +162,7 @@ def _minimise(
     energy: Callable[[float], Energy],
     start: Float[Tensor, " N"],
     give_up_above: float | None,
+    describe: Callable[[Float[Tensor, " N"]], dict[str, float]],
 ) -> Minimum:
     """Walk through the roundings of the penalty in equal shares of the outer steps."""
     settings = problem.settings
@@ -160,9 +173,10 @@ def _minimise(
         [stages[widths[index]] for index in share],
         start,
         inner_iterations=settings.inner_iterations,
-        history=settings.history,
+        memory=settings.history,
         relative_tolerance=settings.relative_tolerance,
         give_up_above=give_up_above,
+        describe=describe,
     )
 
 
@@ -211,4 +225,5 @@ def _counted(fit: Fit, minimum: Minimum) -> Fit:
         iterations=minimum.iterations,
         reason=minimum.reason,
         trace=minimum.trace,
+        history=minimum.history,
     )

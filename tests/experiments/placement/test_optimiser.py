@@ -53,3 +53,27 @@ def test_rounding_the_kink_first_lands_below_the_kinked_energy() -> None:
     kinked = minimise([printed] * 10, torch.zeros(6))
     staged = minimise([wide] * 5 + [narrow] * 5, torch.zeros(6))
     assert printed(staged.state) <= printed(kinked.state) + 0.05
+
+
+def test_a_step_that_ends_far_above_its_begin_is_thrown_away() -> None:
+    calls = 0
+
+    def jumps(state: torch.Tensor) -> torch.Tensor:
+        # Every evaluation is higher than the one before, whatever the state.
+        nonlocal calls
+        calls += 1
+        return bowl(state) * 0.0 + state.sum() * 1e-9 + 3.0**calls
+
+    found = minimise([jumps] * 5, torch.zeros(3))
+    assert found.reason == "diverged"
+    assert found.state.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_the_history_describes_the_start_and_every_sound_step() -> None:
+    def describe(state: torch.Tensor) -> dict[str, float]:
+        return {"first": float(state[0]), "energy": float(bowl(state))}
+
+    found = minimise([bowl] * 4, torch.zeros(3), inner_iterations=2, describe=describe)
+    assert len(found.history) == len(found.trace)
+    assert [item["energy"] for item in found.history] == pytest.approx(found.trace)
+    assert found.history[0]["first"] == 0.0
