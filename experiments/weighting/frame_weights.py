@@ -22,6 +22,7 @@ from experiments.weighting.weights import FrameWeights, uniform_weights
 from experiments.weighting.weights_file import load_network
 from renderer.files import InputError
 
+RULES = ("paak", "geometric", "uniform")
 LAMBDA_G = 0.5
 """Share of the estimated geometric weight (ours: PACE gives neither factor)."""
 LAMBDA_B = 0.5
@@ -41,15 +42,15 @@ def frame_weights(
     lets every frame count alike. Depends on the motion and on what it is expected to touch, not on
     where it goes: methods that are given the same features and seed use the same weights.
     """
+    if settings.weighting not in RULES:
+        wanted = "one of " + ", ".join(RULES)
+        raise InputError("placement settings", "weighting", settings.weighting, wanted)
     if settings.weighting == "uniform":
         return uniform_weights(motion.n_frames)
     moving = moving_body(motion, body)
     if settings.weighting == "geometric":
         columns = np.searchsorted(moving.vertex_ids, features.vertex_ids)
         return geometric_weights(moving.vertices[:, columns], motion.times, features)
-    if settings.weighting != "paak":
-        wanted = "one of paak, geometric, uniform"
-        raise InputError("placement settings", "weighting", settings.weighting, wanted)
     inputs = motion_inputs(moving, body, features)
     values = active_weights(load_network(), inputs, clip_seed(motion, seed))
     return FrameWeights(values, "paak")
@@ -64,8 +65,8 @@ def active_weights(
         scores = network.head(hidden)
         estimate = np.asarray(network.expectation(scores).double().numpy())
     spread = diversity(*gradient_factors(scores, hidden), seed)
-    mixed: Float[np.ndarray, " T"] = LAMBDA_G * estimate / estimate.mean() + LAMBDA_B * spread
-    return mixed / mixed.mean()
+    mixed = LAMBDA_G * estimate / estimate.mean() + LAMBDA_B * spread
+    return np.asarray(mixed / mixed.mean())
 
 
 def clip_seed(motion: Motion, seed: int) -> int:

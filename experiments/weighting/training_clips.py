@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from experiments.body.embedded import load_body
 from experiments.interaction.mesh import moving_body
-from experiments.interaction.pose_pool import PoseClip, pool_size, pose_pool
+from experiments.interaction.pose_pool import PoseClip, pool_sources, recordings
 from experiments.interaction.registry import INTERACTIONS
 from experiments.motion.motion import Motion
 from experiments.motion.resample import FPS, at_times, window
@@ -54,13 +54,16 @@ def build_clips(
     recorded ones two. The split is that of the pool, by clip: what the interaction model never saw
     is held out here too. CMU recordings are used where the folder `PACE_SHARED` has them.
     """
-    generator = np.random.default_rng([seed, 1])
+    sources = list(pool_sources())
+    recorded = sum(2 if recording.test else 3 for recording in recordings())
     clips: list[TrainingClip] = []
-    for index, source in enumerate(pose_pool(np.random.default_rng([seed, 0]))):
-        versions = (0, 1) if source.kind == "captured" else (0,)
-        if source.split == "test" or index % 3 in versions:
-            clips.append(_clip(source, len(clips) % 2 == 1, interaction, generator))
-        progress(index + 1, pool_size())
+    for number, source in enumerate(sources):
+        versions = (0, 1) if number < recorded else (0,)
+        if source.split == "test" or number % 3 in versions:
+            clip = source.build(np.random.default_rng([seed, number]))
+            generator = np.random.default_rng([seed, number, 1])
+            clips.append(_clip(clip, len(clips) % 2 == 1, interaction, generator))
+        progress(number + 1, len(sources))
     return clips
 
 
@@ -73,7 +76,8 @@ def warp_times(
     frame jumps.
     """
     knots = np.linspace(times[0], times[-1], 4)
-    slowness = 1.0 / np.exp(generator.uniform(*np.log(RATES), len(knots)))
+    slowest, fastest = (float(np.log(rate)) for rate in RATES)
+    slowness = np.exp(-generator.uniform(slowest, fastest, len(knots)))
     fine = np.linspace(times[0], times[-1], 10 * len(times))
     spent = np.interp(fine, knots, slowness)
     clock = np.concatenate([[0.0], np.cumsum(0.5 * (spent[1:] + spent[:-1]) * np.diff(fine))])
