@@ -111,8 +111,10 @@ def _simplex(shifts: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "4 3"]:
     _, _, axes = np.linalg.svd(shifts - centre, full_matrices=True)
     along = (shifts - centre) @ axes.T
     reach = np.maximum(np.abs(along).max(0), 1e-3)
-    # The tetrahedron whose inscribed sphere has radius r has its corners at distance 3 r.
-    radius = 3.0 * float(np.linalg.norm(along / reach, axis=1).max()) * (1 + 1e-9)
+    # The tetrahedron whose inscribed sphere has radius r has its corners at distance 3 r. A single
+    # point has no extent, hence the floor.
+    spread = max(1.0, float(np.linalg.norm(along / reach, axis=1).max()))
+    radius = 3.0 * spread * (1 + 1e-9)
     corners: Float[np.ndarray, "4 3"] = centre + (radius * _CORNERS * reach) @ axes
     return corners
 
