@@ -109,7 +109,7 @@ def foot_skate(motion: Motion, body: BodyModel) -> float:
     mesh = body.posed(torch.as_tensor(motion.pose), torch.as_tensor(motion.transl), soles)
     points = mesh.vertices.numpy()
     height = points[..., 2]
-    ground = float(np.percentile(height.min(1), 20))
+    ground = float(np.percentile(height.min(1), 10))
     steps = np.diff(points[..., :2], axis=0) / np.diff(motion.times)[:, None, None]
     speed = np.linalg.norm(steps, axis=-1)
     low = height < ground + STANCE_HEIGHT_M

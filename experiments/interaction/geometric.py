@@ -73,7 +73,7 @@ def geometric_features(
 
 def body_supports(moving: MovingBody) -> list[Support]:
     """All supports of a motion; later ones give way to earlier ones where they share a vertex."""
-    floor = float(np.percentile(moving.vertices[..., 2].min(1), 20))
+    floor = float(np.percentile(moving.vertices[..., 2].min(1), 10))
     lying, seated = lying_frames(moving), seated_frames(moving, floor)
     seated &= ~lying
     seat_height = (

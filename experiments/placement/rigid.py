@@ -27,9 +27,10 @@ def clip_centre(pelvis: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "2"]:
 def clip_floor(lowest: Float[np.ndarray, " T"]) -> float:
     """Height of the floor a clip was captured on: a low percentile of the lowest vertex, metres.
 
-    Not the minimum, because single frames of retargeted capture reach below the floor.
+    Not the minimum, because single frames of retargeted capture reach below the floor; not a high
+    percentile, because the feet of a sleeper leave it for most of the clip.
     """
-    return float(np.percentile(lowest, 20))
+    return float(np.percentile(lowest, 10))
 
 
 def move(
