@@ -122,6 +122,7 @@ def _scene_record(name: str) -> dict[str, Any]:
         "content_hash": scene.content_hash,
         "room_size": list(scene.room_size),
         "objects": len(scene.instances),
+        "sdf_cell_m": scene.volumes.cell,
     }
 
 
