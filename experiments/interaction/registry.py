@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
 from experiments.body.model import BodyModel
 from experiments.interaction.features import InteractionFeatures
 from experiments.interaction.geometric import geometric_features
+from experiments.interaction.learned import SHIPPED, learned_features
 from experiments.motion.motion import Motion
 from experiments.scene.scene import MPCAT40, Scene
 
 InteractionModel = Callable[[Motion, BodyModel, Sequence[str]], tuple[InteractionFeatures, ...]]
 """(motion, body, classes of the scene) -> feature maps, in the order of the model's preference."""
 
-INTERACTIONS: dict[str, InteractionModel] = {"geometric": geometric_features}
+INTERACTIONS: dict[str, InteractionModel] = {
+    "geometric": geometric_features,
+    **{name: partial(learned_features, model=name) for name in SHIPPED},
+}
 """Models that predict contact and classes; `PlacementSettings.interaction` names one."""
 
 VOID, FLOOR = 0, 2
