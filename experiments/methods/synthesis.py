@@ -21,8 +21,8 @@ from experiments.placement.settings import PlacementSettings
 from experiments.scene.scene import Scene
 from experiments.synthesis.body_vector import Clip, to_motion
 from experiments.synthesis.refinement import PHASES, Refined, refine
-from experiments.synthesis.route_net import SEGMENT_FPS
-from experiments.synthesis.sequence import STRIDE, generate, n_segments, scene_features
+from experiments.synthesis.route_net import SEGMENT, SEGMENT_FPS
+from experiments.synthesis.sequence import generate, n_segments, scene_features, subgoal_bodies
 from experiments.synthesis.spots import RoomSpots, Spot, room_spots
 from experiments.synthesis.subgoals import NoSubgoals, choose_subgoals
 from experiments.synthesis.weights import SynthesisNets, load_nets, read_note, weights_file
@@ -59,8 +59,9 @@ def synthesise(
         subgoals = choose_subgoals(spots, segments + 1, rng)
     except NoSubgoals as error:
         raise PlacementError(slot.motion_id, scene.scene_id, str(error)) from None
-    vectors = generate(nets, scene_features(nets, scene), body, subgoals, rng)
-    refined = refine(vectors, [STRIDE * k for k in range(segments + 1)], body, scene)
+    features = scene_features(nets, scene)
+    bodies = subgoal_bodies(nets, features, body, subgoals, rng)
+    refined = refine(generate(nets, features, bodies), bodies[[0, -1]], body, scene)
     if not all(math.isfinite(value) for value in refined.terms.values()):
         reason = "the networks gave a body that is not finite"
         raise OptimisationFailed(slot.motion_id, scene.scene_id, reason)
@@ -140,7 +141,7 @@ def _info(
                 "kind": spot.kind,
                 "place": spot.place,
                 "pelvis": spot.pelvis.round(4).tolist(),
-                "frame": STRIDE * index,
+                "before_frame": SEGMENT * index,
             }
             for index, spot in enumerate(subgoals)
         ],

@@ -1,4 +1,4 @@
-"""Loss terms of training and refinement, each a function of what it measures.
+"""Loss terms of training, two of which refinement uses too: each a function of what it measures.
 
 After Wang et al. (CVPR 2021) and their published code. Distances are signed, metres, negative inside
 solids; axes B batch, T frames, V vertices.
@@ -13,7 +13,7 @@ from torch import Tensor
 from experiments.synthesis.body_vector import POSE
 
 CONTACT_REGIONS = ("back", "buttocks", "left_hand", "right_hand", "calves", "thigh_backs")
-"""Parts of the body that the contact term draws to the scene."""
+"""Parts of the body that the contact term of training draws to the scene."""
 KL_WEIGHT, RECONSTRUCTION_WEIGHT, SUBGOAL_SCENE_WEIGHT = 0.1, 0.1, 0.01
 """Weights of the sub-goal network's loss; the last one for penetration and for contact each."""
 KL_RAMP_EPOCHS = 7.5
@@ -58,17 +58,3 @@ def contact(distance: Float[Tensor, "*N"]) -> Float[Tensor, ""]:
     """
     d = torch.sqrt(distance**2 + 1e-4)
     return (d / (d + 1.0)).mean()
-
-
-def motion(
-    vertices: Float[Tensor, "T V 3"],
-    feet: Float[Tensor, "T F 3"],
-    ends: Float[Tensor, "K V 3"],
-    wanted_ends: Float[Tensor, "K V 3"],
-) -> Float[Tensor, ""]:
-    """Smoothness: squared displacement from frame to frame of the body and again of the feet, m²,
-    and squared distance of the sub-goal frames from where the networks put them.
-    """
-    steps = (vertices[1:] - vertices[:-1]).square().sum(-1).mean()
-    foot_steps = (feet[1:] - feet[:-1]).square().sum(-1).mean()
-    return steps + foot_steps + (ends - wanted_ends).square().sum(-1).mean()

@@ -18,9 +18,6 @@ from experiments.synthesis.spots import Spot
 from experiments.synthesis.subgoal_net import LATENT_SIZE
 from experiments.synthesis.weights import SynthesisNets
 
-STRIDE = SEGMENT + 1
-"""Frames from one sub-goal to the next."""
-
 
 @dataclass(frozen=True)
 class SceneFeatures:
@@ -32,27 +29,23 @@ class SceneFeatures:
 
 
 def n_segments(n_frames: int) -> int:
-    """Segments that cover `n_frames` frames at 30 frames per second, sub-goal frames included."""
-    return max(1, -(-(n_frames - 1) // STRIDE))
+    """Segments that cover `n_frames` frames at 30 frames per second."""
+    return -(-n_frames // SEGMENT)
 
 
 def generate(
-    nets: SynthesisNets,
-    features: SceneFeatures,
-    body: BodyModel,
-    spots: tuple[Spot, ...],
-    rng: np.random.Generator,
+    nets: SynthesisNets, features: SceneFeatures, bodies: Float[Tensor, "K 135"]
 ) -> Float[Tensor, "T 135"]:
-    """Body vectors of a whole sequence, float32: sub-goals every 61 frames, 60 frames between them."""
+    """Body vectors of a whole sequence, float32: 60 frames between each two sub-goal bodies.
+
+    The bodies themselves are no frames of it, as in the published demonstration.
+    """
     with torch.no_grad():
-        bodies = subgoal_bodies(nets, features, body, spots, rng)
         ends = torch.stack([bodies[:-1], bodies[1:]], dim=1)
         n = len(ends)
         route = nets.route(features.route.expand(n, -1), ends[..., STATE])
         poses = nets.pose(features.pose.expand(n, -1), ends[..., POSE], route)
-        between = torch.cat([route, poses], dim=-1)
-        segments = torch.cat([bodies[:-1, None], between], dim=1)
-        return torch.cat([segments.flatten(0, 1), bodies[-1:]])
+        return torch.cat([route, poses], dim=-1).flatten(0, 1)
 
 
 def subgoal_bodies(
@@ -67,7 +60,8 @@ def subgoal_bodies(
     shape = torch.tensor(body_descriptor(body)).float().expand(len(spots), -1)
     latent = torch.tensor(rng.standard_normal((len(spots), LATENT_SIZE))).float()
     feature = features.subgoal.expand(len(spots), -1)
-    found: Tensor = nets.subgoal.sample(feature, states, shape, latent)
+    with torch.no_grad():
+        found: Tensor = nets.subgoal.sample(feature, states, shape, latent)
     return found
 
 

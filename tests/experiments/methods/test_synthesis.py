@@ -56,7 +56,7 @@ def test_the_record_says_seeds_subgoals_counts_and_minutes(made) -> None:
     info = made[1].info
     assert info["capture_minutes"] == 1.5 and info["training_seed"] == 2
     assert info["seed_of_slot"] == slot_seed(7, "synthetic", "walk")
-    assert [goal["frame"] for goal in info["subgoals"]] == [0, 61, 122]
+    assert [goal["before_frame"] for goal in info["subgoals"]] == [0, 60, 120]
     assert [goal["kind"] for goal in info["subgoals"]] == ["stand", "sit", "stand"]
     assert info["segments"] == 2 and info["iterations"] == 70 and info["stopped"] == "done"
     assert (
@@ -143,6 +143,6 @@ def test_the_name_says_how_much_capture_it_learned_from(monkeypatch, tmp_path) -
         read_note(tmp_path / "subgoal")
 
 
-def _unrefined(vectors, subgoals, body, scene):
+def _unrefined(vectors, ends, body, scene):
     terms = dict.fromkeys(("contact", "collision", "motion", "skating"), 0.0)
     return Refined(vectors, terms, 0, (), "done")

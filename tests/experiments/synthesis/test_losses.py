@@ -10,11 +10,9 @@ from experiments.synthesis.losses import (
     kl_divergence,
     kl_weight,
     l1,
-    motion,
     penetration,
     subgoal_reconstruction,
 )
-from experiments.synthesis.stance import find_stances, skating
 
 
 def draws(*shape: int, seed: int = 0) -> torch.Tensor:
@@ -28,11 +26,6 @@ def test_every_loss_has_the_gradient_of_its_value() -> None:
     assert gradcheck(l1, (draws(2, 5), draws(2, 5, seed=1)))
     assert gradcheck(penetration, (draws(3, 7),))
     assert gradcheck(contact, (draws(3, 7),))
-    given = (draws(4, 5, 3), draws(4, 2, 3), draws(2, 5, 3), draws(2, 5, 3, seed=1))
-    assert gradcheck(motion, given)
-    stances = find_stances(draws(6, 2, 3).detach())
-    ankles, toes = draws(6, 2, 3), draws(6, 2, 3, seed=1)
-    assert gradcheck(lambda a, t: skating(a, t, stances, 0.0), (ankles, toes))
 
 
 def test_the_divergence_is_that_of_two_normals() -> None:
@@ -68,13 +61,3 @@ def test_contact_is_robust_far_away_and_smooth_at_the_surface() -> None:
     assert float(contact(torch.tensor([0.0]))) == pytest.approx(0.01 / 1.01)
     assert float(contact(torch.tensor([1e6]))) == pytest.approx(1.0, abs=1e-5)
     assert float(contact(torch.tensor([0.3]))) == float(contact(torch.tensor([-0.3])))
-
-
-def test_motion_is_the_squared_step_of_body_and_feet_and_the_drift_of_the_subgoals() -> None:
-    glide = torch.zeros(5, 4, 3)
-    glide[..., 0] = 0.1 * torch.arange(5)[:, None]
-    held = glide[[0, 4]]
-    still = motion(glide, glide[:, :2], held, held)
-    assert float(still) == pytest.approx(2 * 0.1**2)
-    moved = motion(glide, glide[:, :2], held, held + torch.tensor([0.0, 0.3, 0.0]))
-    assert float(moved - still) == pytest.approx(0.3**2)
