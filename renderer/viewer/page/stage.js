@@ -61,6 +61,7 @@ export class Stage {
 
   /** Look at a box from a corner of the room so that it fills the picture. */
   frame(box, azimuthDegrees = -52, elevationDegrees = 30) {
+    this.#stopTurning();
     const centre = box.getCenter(new Vector3());
     const radius = 0.5 * box.getSize(new Vector3()).length();
     const half = (FIELD_OF_VIEW * Math.PI) / 360;
@@ -76,11 +77,19 @@ export class Stage {
 
   /** Stand at an eye that was made for a picture of 16:9; a narrower picture stands further back. */
   look(eye, target) {
+    this.#stopTurning();
     const back = Math.min(1.6, Math.max(1, 16 / 9 / this.camera.aspect));
     this.controls.target.copy(target);
     this.camera.position.copy(target).addScaledVector(eye.clone().sub(target), back);
     this.controls.update();
     this.dirty = true;
+  }
+
+  /** A turn that is still running out would carry the new view along. */
+  #stopTurning() {
+    this.controls.enableDamping = false;
+    this.controls.update();
+    this.controls.enableDamping = true;
   }
 
   /** Move eye and target together. */
