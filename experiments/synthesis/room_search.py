@@ -67,12 +67,12 @@ class RoomSearch:
 
     def depth(self, window: PosedWindow, spot: Spot) -> float:
         """How deep the deepest marker of any frame is inside something, metres; 0 outside."""
-        distance = self._distance(spun(window.points, spot.yaw, spot.shift))
+        distance = self._distance(at_spot(window.points, spot))
         return max(0.0, -float(distance.min()))
 
     def touch(self, window: PosedWindow, spot: Spot) -> float:
         """How far what should touch is from a surface in the window's still frame, metres."""
-        points = spun(window.points[window.frame, window.rows], spot.yaw, spot.shift)
+        points = at_spot(window.points[window.frame, window.rows], spot)
         return float(_touch(window, self._distance(points)[None])[0])
 
     def _drawn(
@@ -98,7 +98,7 @@ class RoomSearch:
         turns = np.where(beds, rng.integers(4, size=count) * np.pi / 2, quarter)
         yaw = front + turns + np.radians(rng.uniform(-_YAW_DEG, _YAW_DEG, count))
         middle = window.points[window.frame, window.rows].mean(axis=0)[None]
-        moved = spun(np.repeat(middle, count, axis=0)[:, None], yaw, np.zeros((count, 2)))[:, 0]
+        moved = spun(np.repeat(middle[None], count, axis=0), yaw, np.zeros((count, 2)))[:, 0]
         return yaw, target - moved[:, :2]
 
     def _on_free_floor(
@@ -132,16 +132,21 @@ def allowed_depth(window: PosedWindow) -> float:
     return SEAT_DEPTH_M if window.support == "seat" else DEPTH_M
 
 
+def at_spot(points: Float[np.ndarray, "*N 3"], spot: Spot) -> Float[np.ndarray, "*N 3"]:
+    """Points (m) of a window in the room's frame."""
+    moved = spun(points.reshape(1, -1, 3), np.array([spot.yaw]), spot.shift[None])
+    return moved.reshape(points.shape)
+
+
 def spun(
-    points: Float[np.ndarray, "*C N 3"],
-    yaw: Float[np.ndarray, " C"] | float,
-    shift: Float[np.ndarray, "*C 2"],
-) -> Float[np.ndarray, "*C N 3"]:
-    """Points (m) turned by yaw (rad) about the vertical axis, then shifted."""
-    angle = np.asarray(yaw)[..., None]
-    cosine, sine = np.cos(angle), np.sin(angle)
+    points: Float[np.ndarray, "C N 3"],
+    yaw: Float[np.ndarray, " C"],
+    shift: Float[np.ndarray, "C 2"],
+) -> Float[np.ndarray, "C N 3"]:
+    """C sets of points (m), each turned by its yaw (rad) about the vertical axis, then shifted."""
+    cosine, sine = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
     x, y = points[..., 0], points[..., 1]
-    turned = [cosine * x - sine * y + shift[..., 0:1], sine * x + cosine * y + shift[..., 1:2]]
+    turned = [cosine * x - sine * y + shift[:, :1], sine * x + cosine * y + shift[:, 1:]]
     return np.stack([*turned, points[..., 2]], axis=-1)
 
 

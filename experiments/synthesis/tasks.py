@@ -8,7 +8,7 @@ dozen times as long.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -35,6 +35,7 @@ _ENDS = [0, 61]
 _BETWEEN = slice(1, 61)
 
 
+@runtime_checkable
 class Task(Protocol):
     """One network and what it is trained on."""
 
