@@ -27,33 +27,37 @@ from renderer.files import file_sha256, value_sha256
 STRIDE, SHORT_STRIDE = 6, 3
 """Frames taken of training clips, and of those shorter than `_SHORT`."""
 _SHORT = 150
-_FURNITURE = {"train": 1, "test": 2, "second": 3}
-"""First word of the seed of every scene: no scene of one half is ever drawn in the other."""
 
 
 def build_dataset(seed: int = 0, progress: Progress | None = None) -> ContactDataset:
     """Training and test clips, each with supports built to fit it. Cached by recipe and seed."""
-    return _cached("fitted", seed, lambda: _labelled_pool(seed, ("train", "test"), progress))
+    return cached_dataset("fitted", seed, lambda: labelled_pool(seed, None, 1, progress))
 
 
 def build_second_draw(seed: int = 0, progress: Progress | None = None) -> ContactDataset:
     """The test clips of `build_dataset` again, with other scenes drawn for them. Cached."""
-    return _cached("second", seed, lambda: _labelled_pool(seed, ("second",), progress))
+    return cached_dataset("second", seed, lambda: labelled_pool(seed, "test", 2, progress))
 
 
-def _labelled_pool(seed: int, parts: tuple[str, ...], progress: Progress | None) -> ContactDataset:
+def held_out_clips(seed: int = 0) -> list[PoseClip]:
+    """The clips of the test split before any scene is built for them."""
+    return list(pose_pool(seed, "test"))
+
+
+def labelled_pool(
+    seed: int, split: str | None, draw: int, progress: Progress | None = None
+) -> ContactDataset:
+    """The clips of a split in the scenes of one draw.
+
+    Seeds of scenes begin with the split and the draw, so no scene of one is ever met in another.
+    """
     pieces = []
-    for number, pose in enumerate(pose_pool(np.random.default_rng(seed))):
-        part = "second" if parts == ("second",) else pose.split
+    for number, pose in enumerate(pose_pool(seed, split)):
+        words = [draw if pose.split == "test" else 0, seed, number]
+        pieces.append(labelled_clip(pose, number, np.random.default_rng(words)))
         if progress is not None:
-            progress(number, pool_size())
-        if parts == ("second",) and pose.split != "test":
-            continue
-        scene_seed = [_FURNITURE[part], seed, number]
-        piece = labelled_clip(pose, number, np.random.default_rng(scene_seed))
-        if len(piece.frame):
-            pieces.append(piece)
-    return joined(pieces)
+            progress(number + 1, pool_size(split))
+    return joined([piece for piece in pieces if len(piece.frame)])
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,8 @@ def cache_key(kind: str, seed: int, version: int = RECIPE_VERSION) -> str:
     return value_sha256([kind, seed, version, names, file_sha256(BODY_FILE)])
 
 
-def _cached(kind: str, seed: int, build: Callable[[], ContactDataset]) -> ContactDataset:
+def cached_dataset(kind: str, seed: int, build: Callable[[], ContactDataset]) -> ContactDataset:
+    """A data set from the cache, or built and put there."""
     target = cache_path("contact", cache_key(kind, seed), ".npz")
     if not target.is_file():
         build().save(target)

@@ -18,7 +18,7 @@ from experiments.motion.motion import Motion
 SEATED_SPEED, LYING_SPEED, HAND_SPEED, STANDING_SPEED = 0.30, 0.35, 0.15, 0.12
 """The pelvis, or the hand, is slower than this in a hold, m/s."""
 HOLD_FRAMES = 8
-LYING_GAP_M = 0.16
+LYING_GAP_M = 0.2
 """The trunk of a lying body is this near the lowest of all skin."""
 HAND_HEIGHT_M = 0.6
 _INDEX = {name: index for index, name in enumerate(JOINT_NAMES)}

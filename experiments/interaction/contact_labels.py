@@ -9,12 +9,12 @@ from jaxtyping import Bool, Float, Integer, UInt8
 
 from experiments.interaction.contact_holds import PosedClip, find_holds
 from experiments.interaction.contact_scene import ContactScene
-from experiments.interaction.contact_supports import draw_scene
+from experiments.interaction.contact_supports import FLOOR, draw_scene
 
 DEEPEST_M = 0.035
 """A frame with a vertex deeper than this inside anything is dropped."""
 FURTHEST_M = 0.06
-"""A frame with nothing this near to trunk, legs or head hangs on something that was not recorded."""
+"""A frame that nothing this near holds up hangs on something that was not recorded."""
 DRAWS = 8
 ENOUGH = 0.9
 """A scene that keeps this share of the frames is taken at once."""
@@ -55,14 +55,26 @@ def in_scene(
 ) -> LabelledFrames:
     """The frames that are possible in a scene, and their labels."""
     distance, nearest, depth = scene.nearest(clip.vertices[frames])
-    hands = np.concatenate([clip.columns[name] for name in ("left_hand", "right_hand", "forearms")])
-    carrying = np.setdiff1d(np.arange(distance.shape[1]), hands)
-    keep = possible(distance[:, carrying], depth)
+    keep = possible(distance, nearest, depth, carrying_columns(clip))
     return LabelledFrames(frames[keep], distance[keep], nearest[keep], scene)
 
 
 def possible(
-    carrying: Float[np.ndarray, "F C"], depth: Float[np.ndarray, "F V"]
+    distance: Float[np.ndarray, "F V"],
+    nearest: UInt8[np.ndarray, "F V"],
+    depth: Float[np.ndarray, "F V"],
+    carrying: Integer[np.ndarray, " C"],
 ) -> Bool[np.ndarray, " F"]:
-    """Frames without deep penetration in which something other than hands and forearms is supported."""
-    return np.asarray((depth.max(1) <= DEEPEST_M) & (carrying.min(1) <= FURTHEST_M))
+    """Frames without deep penetration in which something holds the body up.
+
+    That is anything near to its trunk, legs or head, or the floor near to its hands.
+    """
+    on_floor = np.where(nearest == FLOOR.label, distance, np.inf).min(1)
+    held = np.minimum(distance[:, carrying].min(1), on_floor) <= FURTHEST_M
+    return np.asarray((depth.max(1) <= DEEPEST_M) & held)
+
+
+def carrying_columns(clip: PosedClip) -> Integer[np.ndarray, " C"]:
+    """The vertices that can carry the body on furniture: all but hands and forearms."""
+    arms = np.concatenate([clip.columns[n] for n in ("left_hand", "right_hand", "forearms")])
+    return np.setdiff1d(np.arange(clip.vertices.shape[1]), arms)

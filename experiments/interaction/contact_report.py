@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -36,6 +36,7 @@ STRIDE = 3
 """Scores count every third frame of the test clips; flicker counts all."""
 
 
+@runtime_checkable
 class ContactModel(Protocol):
     """A conditional generative model, as the report asks it."""
 

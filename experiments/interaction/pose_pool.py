@@ -60,18 +60,25 @@ class Recording:
     test: bool = False
 
 
-def pose_pool(rng: np.random.Generator) -> Iterator[PoseClip]:
-    """All clips in a fixed order, drawn from one generator."""
-    seeds = rng.spawn(2)
-    yield from _captured(seeds[0])
-    yield from _authored(seeds[1])
+def pose_pool(seed: int, split: str | None = None) -> Iterator[PoseClip]:
+    """All clips, or those of one split, in a fixed order; every clip has a generator of its own."""
+    for number, source in enumerate(pool_sources()):
+        if split in (None, source.split):
+            yield source.build(np.random.default_rng([seed, number]))
 
 
-def pool_size() -> int:
+def pool_size(split: str | None = None) -> int:
     """How many clips `pose_pool` yields."""
-    captured = sum(2 if recording.test else 3 for recording in recordings())
-    tested = {family: _test_count(count) for family, (_, count) in FAMILIES.items()}
-    return captured + sum(3 * n - 2 * tested[family] for family, (_, n) in FAMILIES.items())
+    return sum(split in (None, source.split) for source in pool_sources())
+
+
+@dataclass(frozen=True)
+class PoolSource:
+    """A clip of the pool before it is built."""
+
+    name: str
+    split: str
+    build: Callable[[np.random.Generator], PoseClip]
 
 
 def recordings() -> tuple[Recording, ...]:
@@ -79,31 +86,46 @@ def recordings() -> tuple[Recording, ...]:
     return (*_PYBULLET, *_cmu())
 
 
-def _captured(rng: np.random.Generator) -> Iterator[PoseClip]:
+def pool_sources() -> Iterator[PoolSource]:
+    """Every clip and version there is: recorded ones first, then the authored families."""
     for index, recording in enumerate(recordings()):
-        capture = recording.read()
         for version in range(2 if recording.test else 3):
             body = BODY_NAMES[(index + version) % len(BODY_NAMES)]
-            figure = figure_of(body)
-            motion = _grounded(adapt(capture, figure), figure, recording.grounding)
-            motion = _versioned(motion, figure, recording.grounding, version, recording.test, rng)
-            yield _named(
-                recording.name, "captured", recording.test, recording.family, version, motion
-            )
-
-
-def _authored(rng: np.random.Generator) -> Iterator[PoseClip]:
+            split = "test" if recording.test else "train"
+            yield PoolSource(recording.name, split, partial(_captured, recording, version, body))
     index = 0
-    for family, (recipe, count) in FAMILIES.items():
+    for family, (_, count) in FAMILIES.items():
         for number in range(count):
             test = number >= count - _test_count(count)
-            seed = int(rng.integers(1 << 31))
             for version in range(1 if test else 3):
-                figure = figure_of(BODY_NAMES[(index + version) % len(BODY_NAMES)])
-                motion = recipe(figure, np.random.default_rng(seed))
-                motion = _versioned(motion, figure, "none", version, test, rng)
-                yield _named(f"{family}_{number:02d}", "authored", test, family, version, motion)
+                body = BODY_NAMES[(index + version) % len(BODY_NAMES)]
+                build = partial(_authored, family, number, version, body, test)
+                split = "test" if test else "train"
+                yield PoolSource(f"{family}_{number:02d}", split, build)
             index += 1
+
+
+def _captured(recording: Recording, version: int, body: str, rng: np.random.Generator) -> PoseClip:
+    figure = figure_of(body)
+    motion = _grounded(adapt(_read(recording), figure), figure, recording.grounding)
+    motion = _versioned(motion, figure, recording.grounding, version, recording.test, rng)
+    return _named(recording.name, "captured", recording.test, recording.family, version, motion)
+
+
+@lru_cache(maxsize=2)
+def _read(recording: Recording) -> Capture:
+    return recording.read()
+
+
+def _authored(
+    family: str, number: int, version: int, body: str, test: bool, rng: np.random.Generator
+) -> PoseClip:
+    """The versions of one clip share its parameters: those follow from family and number."""
+    seeds = [list(FAMILIES).index(family), number]
+    figure = figure_of(body)
+    motion = FAMILIES[family][0](figure, np.random.default_rng(seeds))
+    motion = _versioned(motion, figure, "none", version, test, rng)
+    return _named(f"{family}_{number:02d}", "authored", test, family, version, motion)
 
 
 def _test_count(count: int) -> int:

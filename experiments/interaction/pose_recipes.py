@@ -282,10 +282,12 @@ def _rolled(
 def _fold_arm(pose: np.ndarray, side: str, prone: bool, rng: np.random.Generator) -> None:
     """Out from under the body: before the chest, or alongside when prone."""
     sign = -1.0 if side == "left" else 1.0
-    across, down = ((20, 40), (55, 75)) if prone else ((60, 90), (0, 25))
+    across, down = ((-8, 4), (60, 80)) if prone else ((60, 90), (0, 25))
     turn = np.radians([0.0, sign * rng.uniform(*across), sign * rng.uniform(*down)])
     pose[:, INDEX[f"{side}_shoulder"]] = turn
-    pose[:, INDEX[f"{side}_elbow"]] = np.radians([0.0, sign * rng.uniform(10, 80), 0.0])
+    pose[:, INDEX[f"{side}_elbow"]] = np.radians(
+        [0.0, sign * rng.uniform(0, 10 if prone else 80), 0.0]
+    )
     pose[:, INDEX[f"{side}_wrist"]] = 0.0
     pose[:, INDEX[f"{side}_collar"]] = 0.0
 
