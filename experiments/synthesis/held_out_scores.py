@@ -192,7 +192,7 @@ def pose_score(true: Float[Tensor, "B 62 135"], pose: Float[Tensor, "B 60 126"])
     angle = _angles(pose, wanted)
     gaps = [
         (_joints(pose[part]) - _joints(wanted[part])).norm(dim=-1).mean(dim=(1, 2))
-        for part in torch.arange(len(true)).split(_BLOCK)
+        for part in _blocks(len(true))
     ]
     return PoseScore(float(angle.mean()), 100 * float(torch.cat(gaps).mean()))
 
@@ -327,6 +327,10 @@ def _heading(vectors: Float[Tensor, "B 135"]) -> Float[Tensor, " B"]:
     return torch.atan2(facing[:, 0], -facing[:, 1])
 
 
+def _blocks(count: int) -> list[slice]:
+    return [slice(start, start + _BLOCK) for start in range(0, count, _BLOCK)]
+
+
 def _matrices(columns: Float[Tensor, "B N"]) -> Float[Tensor, "B J 3 3"]:
     pair = columns.reshape(len(columns), -1, 2, 3).transpose(-1, -2)
     matrices: Tensor = roma.special_gramschmidt(pair, epsilon=1e-8)
@@ -336,7 +340,9 @@ def _matrices(columns: Float[Tensor, "B N"]) -> Float[Tensor, "B J 3 3"]:
 def _angles(one: Float[Tensor, "*B N"], two: Float[Tensor, "*B N"]) -> Float[Tensor, "*B J"]:
     """Angle between rotations given as 6D columns, degrees."""
     pairs = [
-        roma.special_gramschmidt(side.unflatten(-1, (-1, 2, 3)).transpose(-1, -2), epsilon=1e-8)
+        roma.special_gramschmidt(
+            side.reshape(*side.shape[:-1], -1, 2, 3).transpose(-1, -2), epsilon=1e-8
+        )
         for side in (one, two)
     ]
     angle: Tensor = torch.rad2deg(roma.rotmat_geodesic_distance(*pairs))

@@ -111,7 +111,7 @@ class PlacedWindows:
     def moving(self, placements: Integer[np.ndarray, " K"]) -> Integer[np.ndarray, " L"]:
         """Those of them whose root ends `MIN_WAY_M` or more from where it began."""
         way = np.linalg.norm(self.transl[:, -1] - self.transl[:, 0], axis=1)
-        return placements[way[self.window[placements]] >= MIN_WAY_M]
+        return np.asarray(placements[way[self.window[placements]] >= MIN_WAY_M])
 
     def capture_minutes(self, split: Split = "train") -> float:
         """Minutes of real recording that windows of the split were cut from, not augmented."""

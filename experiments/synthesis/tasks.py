@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import torch
 from jaxtyping import Float, Integer
-from torch import Tensor, nn
+from torch import Tensor
 
 from experiments.body.embedded import BODY_NAMES, load_body
 from experiments.synthesis import losses
@@ -30,6 +30,7 @@ from experiments.synthesis.training_set import (
 )
 from experiments.synthesis.weights import Kind
 
+SynthesisNet = RouteNet | PoseNet | SubgoalNet
 HELD_OUT_BATCH = 512
 _ENDS = [0, 61]
 _BETWEEN = slice(1, 61)
@@ -40,11 +41,15 @@ class Task(Protocol):
     """One network and what it is trained on."""
 
     kind: Kind
-    net: nn.Module
     features: RoomFeatures
     items: int
     """Training samples in an epoch."""
     batch: int
+
+    @property
+    def net(self) -> SynthesisNet:
+        """The network, with its own scene encoder."""
+        ...
 
     def loss(self, seed: tuple[int, int], epoch: float) -> Float[Tensor, ""]:
         """Training loss of the batch that `seed` (run, step) draws."""

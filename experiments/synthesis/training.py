@@ -151,7 +151,7 @@ class _Checkpoint:
     def load(self) -> tuple[int, list[CurveRow]]:
         """Step and curve of the checkpoint; without one, fresh room features and step 0."""
         if not self.tensors.is_file():
-            self.task.features.refresh(_encoder(self.task.net))
+            self.task.features.refresh(self.task.net.scene)
             return 0, []
         try:
             with safe_open(self.tensors, framework="pt") as archive:
@@ -195,10 +195,6 @@ def _seeded(make: Callable[[], Net], seed: int) -> Net:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         return make()
-
-
-def _encoder(net: nn.Module) -> nn.Module:
-    return net.get_submodule("scene")
 
 
 def _check_plan(folder: Path, plan: Plan, data: PlacedWindows, resume: bool) -> None:

@@ -18,7 +18,7 @@ from renderer.files import atomic_path, write_json
 
 Show = Callable[[str, int, int], None]
 """(stage, done, of how many): a progress bar a stage."""
-CURVE_STEPS = 600
+CURVE_STEPS = 400
 """Steps of each short run of the learning curve."""
 
 
@@ -29,7 +29,11 @@ def run_training(
     data = training_windows(settings, _shares(show, "clips and rooms"))
     curves, nets = train_synthesis(data, plan, folder, resume, _shares(show, "networks"))
     draw_curves(curves, folder / "curves.png")
-    record = {"weights": _weights(folder), "data": data_record(data), "curves": _last(curves)}
+    record: dict[str, Any] = {
+        "weights": _weights(folder),
+        "data": data_record(data),
+        "curves": _last(curves),
+    }
     if report:
         train, held = TrainingSet(data, "train"), TrainingSet(data, "held_out")
         record["held_out"] = held_out_scores(nets, train, held)

@@ -148,7 +148,7 @@ def turned_vectors(
     """
     turn = about_z(yaw)[:, None]
     pelvis = (turn @ (vectors[..., :3] + rest[:, None])[..., None])[..., 0]
-    columns = vectors[..., 3:9].unflatten(-1, (2, 3)) @ turn.transpose(-1, -2)
+    columns = vectors[..., 3:9].reshape(*vectors.shape[:-1], 2, 3) @ turn.transpose(-1, -2)
     transl = pelvis + shift[:, None] - rest[:, None]
     return torch.cat([transl, columns.flatten(-2), vectors[..., 9:]], dim=-1)
 
