@@ -26,6 +26,8 @@ def low_pass(motion: Motion, cutoff_hz: float = CUTOFF_HZ) -> Motion:
     padding = min(motion.n_frames - 1, int(motion.fps))
     quaternion = sosfiltfilt(sections, to_quaternion(motion.pose), axis=0, padlen=padding)
     transl = sosfiltfilt(sections, motion.transl, axis=0, padlen=padding)
+    # The filter answers with a reversed view, which torch refuses.
+    transl = np.ascontiguousarray(transl)
     return dataclasses.replace(motion, pose=from_quaternion(quaternion), transl=transl)
 
 

@@ -6,11 +6,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from experiments.config import read_config
 from experiments.methods import METHODS
 from experiments.methods.preparation import prepare
 from experiments.metrics import plausibility
-from experiments.motion.resample import resample
+from experiments.motion.cleanup import clean_recording
+from experiments.motion.figure import figure_of
+from experiments.motion.importing import read_capture
+from experiments.motion.library import load_motion, trim
+from experiments.motion.motion import write_motion
+from experiments.motion.resample import low_pass, resample, window
+from experiments.motion.retarget import retarget
+from experiments.pipeline import build_set
+from experiments.placement.placement import read_placement
 from experiments.placement.settings import PRESETS
+from renderer.catalogue import read_catalogue
 
 FAST = PRESETS["fast"]
 
@@ -93,3 +103,57 @@ def test_a_full_turn_between_frames_is_taken_out_before_optimising(sit, slim, se
     jumping = dataclasses.replace(motion, pose=pose)
     problem = prepare(jumping, seat_room, slim, FAST, 0)
     assert problem.pose.numpy() == pytest.approx(motion.pose, abs=1e-5)
+
+
+CONFIG = """
+set_id = "fast"
+seed = 1
+scenes = ["bedroom"]
+motions_dir = "motions"
+methods = ["posa_t", "pace"]
+study_methods = ["posa_t", "pace"]
+[placement]
+preset = "fast"
+[render]
+preset = "demo"
+[extras]
+catch = 0
+practice = 0
+"""
+
+
+def build_from(motion, folder):
+    """Everything from a motion file to clips; returns the motion of PACE's placement and the clips."""
+    (folder / "motions").mkdir()
+    write_motion(motion, folder / "motions" / f"{motion.motion_id}.npz")
+    (folder / "fast.toml").write_text(CONFIG)
+    build_set(read_config(folder / "fast.toml"), folder / "set", jobs=1)
+    placement = read_placement(folder / "set" / "placements" / f"bedroom__{motion.motion_id}__pace")
+    return placement, read_catalogue(folder / "set").clips
+
+
+@pytest.mark.slow
+def test_an_authored_clip_at_120_goes_the_whole_way_to_pictures(tmp_path) -> None:
+    motion = resample(trim(load_motion("walk_turn_right"), 1.2), 120.0)
+    motion = dataclasses.replace(motion, motion_id="fast_walk")
+    placement, clips = build_from(motion, tmp_path)
+    assert placement.motion.n_frames == motion.n_frames > 130
+    assert placement.info["frames_optimised"] < 0.5 * motion.n_frames
+    assert len(clips) == 2
+    for clip in clips:
+        assert clip.fps == 30.0
+        assert clip.duration_s == pytest.approx(motion.duration_s, abs=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.shared
+def test_a_recorded_clip_at_120_goes_the_whole_way_to_pictures(shared_data, tmp_path) -> None:
+    figure = figure_of("male_slim")
+    capture = read_capture(shared_data / "cmu" / "02" / "02_01.amc")
+    recorded = low_pass(retarget(capture, figure))
+    recorded = dataclasses.replace(recorded, motion_id="cmu_walk")
+    motion = clean_recording(window(recorded, 0, 144), figure)
+    assert motion.fps == 120.0
+    placement, clips = build_from(motion, tmp_path)
+    assert placement.motion.n_frames == 144 and placement.info["frames_optimised"] < 72
+    assert [clip.n_frames for clip in clips] == [36, 36]
