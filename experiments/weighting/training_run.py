@@ -28,7 +28,10 @@ def run_training(
         raise InputError("training settings", "interaction", settings.interaction, wanted)
     folder.mkdir(parents=True, exist_ok=True)
     clips = build_clips(
-        settings.interaction, settings.seed, lambda done, n: progress("clips", done, n)
+        settings.interaction,
+        settings.seed,
+        folder / "clips",
+        lambda done, n: progress("clips", done, n),
     )
     run = train_network(clips, settings, folder, lambda done, n: progress("epochs", done, n))
     write_curve(run.curve, folder)

@@ -4,16 +4,19 @@ import dataclasses
 
 import numpy as np
 import pytest
+import torch
 from scipy.spatial.transform import Rotation
 
 from experiments.alteration import alteration_cost, foot_skate, joint_jerk, rigid_between
 from experiments.metrics import plausibility, skin_distances
+from experiments.placement.features import choose_features
 from experiments.placement.pointwise import nearest_label
 from experiments.placement.rigid import move_motion
 from experiments.placement.settings import PRESETS
 from experiments.scene.lookup import trilinear_reference
 
 FAST = PRESETS["fast"]
+RULE = dataclasses.replace(FAST, interaction="geometric")
 MIDDLE = np.array([0.9, 0.9, 0.0])
 
 
@@ -64,8 +67,6 @@ def test_vertices_deeper_than_a_centimetre_are_counted_by_their_height(
 
 
 def skin_heights(motion, body) -> np.ndarray:
-    import torch
-
     mesh = body.posed(
         torch.as_tensor(motion.pose), torch.as_tensor(motion.transl), body.body_component
     )
@@ -81,11 +82,27 @@ def test_tolerances_count_near_misses(stander, slim, empty_room, gap: float, tou
     assert sum(value.all() for value in scores.tolerant.values()) == touching
 
 
+@pytest.mark.parametrize("gap", [0.0, 0.012, 0.018])
+def test_fulfilled_predictions_are_counted_by_their_height(
+    stander, slim, empty_room, gap: float
+) -> None:
+    original, placed = stander
+    raised = lifted(placed, gap)
+    features = choose_features(original, empty_room, slim, RULE)
+    pose, transl = torch.as_tensor(raised.pose), torch.as_tensor(raised.transl)
+    heights = slim.posed(pose, transl, features.vertex_ids).vertices[..., 2].numpy()
+    predicted = features.contact > 0.5
+    scores = plausibility(raised, original, empty_room, slim, RULE)
+    assert scores.predicted_near == pytest.approx(
+        float((np.abs(heights) < 0.02)[predicted].mean()), abs=0.02
+    )
+    assert scores.semantic_match == 1.0
+    assert scores.frames_with_prediction == predicted.any(1).mean()
+
+
 def test_the_skin_is_read_as_the_textbook_reads_it(stander, slim, seat_room) -> None:
     _, placed = stander
     distance, label = skin_distances(placed, seat_room, slim)
-    import torch
-
     points = slim.posed(
         torch.as_tensor(placed.pose), torch.as_tensor(placed.transl), slim.body_component
     ).vertices.numpy()

@@ -18,7 +18,12 @@ from experiments.weighting.training import (
     train_network,
     weight_bins,
 )
-from experiments.weighting.training_clips import TrainingClip, warp_times
+from experiments.weighting.training_clips import (
+    TrainingClip,
+    read_clip,
+    warp_times,
+    write_clip,
+)
 from experiments.weighting.weights_file import load_network, network_metadata
 from renderer.files import InputError
 
@@ -102,6 +107,15 @@ def test_a_part_of_a_clip_is_weighed_as_a_clip_of_its_own(made_up) -> None:
     cues = made_up[0].cues
     alone = FrameCues(cues.speed[10:40], cues.histogram[10:40], cues.strength[10:40])
     assert np.array_equal(cues.weights(slice(10, 40)), alone.weights())
+
+
+def test_a_clip_survives_its_file(made_up, tmp_path) -> None:
+    write_clip(made_up[0], tmp_path / "clip.npz")
+    back = read_clip(tmp_path / "clip.npz")
+    assert (back.name, back.captured, back.held_out) == ("0", False, True)
+    assert torch.equal(back.inputs.points, made_up[0].inputs.points)
+    assert torch.equal(back.inputs.classes, made_up[0].inputs.classes)
+    assert np.array_equal(back.cues.weights(), made_up[0].cues.weights())
 
 
 def test_warped_time_runs_forward_from_start_to_end_at_the_speeds_allowed() -> None:
