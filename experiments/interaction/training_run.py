@@ -27,7 +27,7 @@ from renderer.files import InputError, write_json
 
 KL_WEIGHTS: tuple[float, ...] = (1e-3, 3e-3, 1e-2, 0.1)
 """Values that a sweep tries; the last is POSA's."""
-SCORED_BODIES = 3000
+SCORED_BODIES = 1000
 """At most this many bodies, evenly spread, judge a network during a run."""
 
 Show = Callable[[str, int, int], None]
