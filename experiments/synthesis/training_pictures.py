@@ -24,7 +24,7 @@ _LEVELS = np.arange(0.3, 1.7, 0.1)
 
 def draw_curves(curves: dict[Kind, list[CurveRow]], target: Path) -> None:
     """Training loss and held-out error of every network over the steps."""
-    figure, axes = _figure(1, 3, (12, 3.6))
+    figure, axes = _figure(1, 3, (12.0, 3.6))
     for axis, (kind, rows) in zip(axes, curves.items(), strict=True):
         steps = [row.step for row in rows]
         axis.plot(steps, [row.train for row in rows], label="training loss")
@@ -38,7 +38,7 @@ def draw_routes(nets: SynthesisNets, held: TrainingSet, target: Path, count: int
     """Held-out routes from above: recorded black, RouteNet's red, on the room's clearance."""
     chosen = spread(held.moving, count)
     segments = predicted_segments(nets, held, chosen)
-    figure, axes = _figure(2, (count + 1) // 2, (4 * ((count + 1) // 2), 8))
+    figure, axes = _figure(2, (count + 1) // 2, (4.0 * ((count + 1) // 2), 8.0))
     for row, (axis, room) in enumerate(
         zip(axes.ravel(), held.room_of(chosen).tolist(), strict=False)
     ):
@@ -58,7 +58,7 @@ def draw_bodies(nets: SynthesisNets, held: TrainingSet, target: Path, count: int
     body = vectors[torch.arange(count), torch.as_tensor(frames)]
     latent = torch.from_numpy(rng.standard_normal((count, LATENT_SIZE))).float()
     sample = sampled_bodies(nets.subgoal, held, placements, body, latent)
-    figure, axes = _figure(2, count // 2, (3 * (count // 2), 6.4))
+    figure, axes = _figure(2, count // 2, (3.0 * (count // 2), 6.4))
     for row, axis in enumerate(axes.ravel()):
         name = BODY_NAMES[int(held.body_of(placements)[row])]
         points = held.rooms[int(held.room_of(placements)[row])].points.numpy()
