@@ -1,11 +1,12 @@
 // The room: its glTF as meshes, grouped so that walls and tall furniture can leave the view.
 import {
-  Box3, BufferAttribute, BufferGeometry, Group, Mesh, MeshLambertMaterial, Ray, RepeatWrapping, SRGBColorSpace,
-  Texture, Vector3,
+  Box3, BufferAttribute, BufferGeometry, Group, Mesh, MeshLambertMaterial, Raycaster, RepeatWrapping,
+  SRGBColorSpace, Texture, Vector3,
 } from "three";
 
 export const WALL_MODES = ["cutaway", "xray", "solid"];
 const XRAY_OPACITY = { wall: 0.14, thing: 0.3 };
+const [TALL, AT_WALL] = [1.15, 0.15]; // metres, as in the clips
 const ROUND_EYE = 0.1; // metres: a wall this close to the eye counts as in front of the room
 
 export class Room {
@@ -47,13 +48,22 @@ export class Room {
     const shut = this.#wallsInFront(eye);
     for (const group of this.groups) {
       const { wall, tall, box } = group.userData;
-      const isFloor = group.name === "floor";
-      const inFront = wall !== null && shut.has(wall);
-      group.visible = this.mode === "solid" || !inFront;
-      const fades = this.mode === "xray" ? !isFloor : this.mode === "cutaway" && tall && hides(eye, body, box);
+      const touched = box.intersectsBox(body);
+      const away = wall === null ? tall && !touched && this.#standsAt(shut, box) : shut.has(wall);
+      group.visible = this.mode === "solid" || !away;
+      const fades = this.mode === "xray"
+        ? group.name !== "floor"
+        : this.mode === "cutaway" && group.visible && tall && !touched && hides(eye, body, group);
       const kind = fades ? "xray" : "solid";
       for (const mesh of group.children) mesh.material = mesh.userData[kind];
     }
+  }
+
+  /** Whether tall furniture stands with its back to one of these walls: with the wall gone it would hide the room. */
+  #standsAt(walls, box) {
+    const [width, depth] = this.size;
+    const gap = { n: depth - box.max.y, s: box.min.y, e: width - box.max.x, w: box.min.x };
+    return box.max.z > TALL && [...walls].some((wall) => gap[wall] < AT_WALL);
   }
 
   #wallsInFront(eye) {
@@ -63,16 +73,18 @@ export class Room {
   }
 }
 
-/** Whether a box stands between the eye and the body and is not itself what the body touches. */
-function hides(eye, body, box) {
-  if (body.isEmpty() || box.intersectsBox(body)) return false;
+/** Whether a group really stands between the eye and two or more of five points up the body's middle. */
+function hides(eye, body, group) {
+  if (body.isEmpty()) return false;
   const middle = body.getCenter(new Vector3());
-  return [body.min.z, middle.z, body.max.z].some((z) => {
-    const target = new Vector3(middle.x, middle.y, z);
-    const ray = new Ray(eye, target.clone().sub(eye).normalize());
-    const hit = ray.intersectBox(box, new Vector3());
-    return hit !== null && hit.distanceTo(eye) < target.distanceTo(eye);
-  });
+  let blocked = 0;
+  for (const share of [0.1, 0.3, 0.5, 0.7, 0.9]) {
+    const target = new Vector3(middle.x, middle.y, body.min.z + share * (body.max.z - body.min.z));
+    const caster = new Raycaster(eye, target.clone().sub(eye).normalize(), 0, eye.distanceTo(target));
+    const near = caster.ray.intersectsBox(group.userData.box);
+    if (near && caster.intersectObjects(group.children, false).length > 0) blocked += 1;
+  }
+  return blocked >= 2;
 }
 
 async function readTexture(blob) {
@@ -108,7 +120,7 @@ function seeThrough(material, kind) {
   return faded;
 }
 
-/** Baked occlusion dims the light that comes from everywhere, not the lamp's. */
+/** Baked occlusion dims the light that comes from everywhere, not the lamp's; backs that stood at a wall stay readable. */
 function occluded(material) {
   material.onBeforeCompile = (shader) => {
     shader.vertexShader = shader.vertexShader
@@ -116,7 +128,7 @@ function occluded(material) {
       .replace("#include <begin_vertex>", "#include <begin_vertex>\nvOpen = occlusion;");
     shader.fragmentShader = shader.fragmentShader
       .replace("#include <common>", "#include <common>\nvarying float vOpen;")
-      .replace("#include <aomap_fragment>", "reflectedLight.indirectDiffuse *= vOpen;");
+      .replace("#include <aomap_fragment>", "reflectedLight.indirectDiffuse *= max(vOpen, 0.25);");
   };
   return material;
 }
