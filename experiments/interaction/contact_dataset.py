@@ -75,7 +75,7 @@ class ContactDataset:
     def bodies_of(self, **wanted: str) -> Bool[np.ndarray, " N"]:
         """Mask of the bodies whose clip has these fields, e.g. `split="test", kind="captured"`."""
         match = [all(getattr(clip, k) == v for k, v in wanted.items()) for clip in self.clips]
-        return np.array(match, dtype=bool)[self.clip]
+        return np.asarray(np.array(match, dtype=bool)[self.clip])
 
     def save(self, target: Path) -> None:
         """Write as `.npz`, whole or not at all."""
