@@ -50,7 +50,7 @@ class TrainingSettings:
     """All 42 classes instead of those that the data have."""
     latent: int = 16
     width: int = 64
-    epochs: int = 8
+    epochs: int = 5
     batch: int = 64
     peak_rate: float = 2e-3
     """Highest learning rate of the one cycle (Adam)."""

@@ -43,7 +43,9 @@ LEAST_TOUCH = 3
 """As many vertices off the feet, for `LEAST_TIME` of the clip, make a touch."""
 LEAST_TIME = 0.1
 LEAST_SHARE = 0.05
-"""A class less likely than this is no alternative."""
+"""Where the scene's classes are together less likely than this, what is to be touched is not there."""
+RIVAL_SHARE = 0.4
+"""A class with this much of the leading class's probability is an alternative to it."""
 ALIKE = 0.8
 """Samples whose touches share at least this much of their union count as one."""
 ABSENT = -30.0
@@ -64,6 +66,10 @@ SHIPPED: dict[str, tuple[str, str]] = {
     "learned": (
         "posa_2cm.safetensors",
         "1c19e90734e6390af61f041e98dbaa7f9bf2b35fa6a1c2397ee8f729bed3d147",
+    ),
+    "learned_5cm": (
+        "posa_5cm.safetensors",
+        "1f31ca2a5baa4820e772bbf924e5b05d7797d7dfc8c8c670c424af8fe8493f4b",
     ),
 }
 """Name of a model to its weights file and that file's SHA-256."""
@@ -263,7 +269,7 @@ def class_alternatives(
 ) -> list[Float[np.ndarray, "T V 42"]]:
     """The scores, and the same with the leading class of touch (`_leading`) traded for its rivals.
 
-    A rival is a class of the scene, not floor, that has `LEAST_SHARE` at those vertices by
+    A rival is a class of the scene, not floor, about as likely at those vertices (`RIVAL_SHARE`) by
     `class_share`, p(class | body) over prior samples on every `STRIDE`-th frame; all vertices change
     together, so that one does not sit on two things.
     """
@@ -276,7 +282,7 @@ def class_alternatives(
     share = class_share[touched].mean(0) if touched.any() else np.zeros(N_CLASSES)
     maps = [scores]
     for rival in np.argsort(-share, kind="stable").tolist():
-        likely = share[rival] >= LEAST_SHARE and MPCAT40[rival] in scene_classes
+        likely = share[rival] >= RIVAL_SHARE * share[leading] and MPCAT40[rival] in scene_classes
         if likely and rival not in (0, leading, FLOOR) and len(maps) < MAX_CLASSES:
             traded = scores.copy()
             traded[there] = _raised(traded[there], rival)
