@@ -10,26 +10,22 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-import roma
 import torch
 from jaxtyping import Float, Integer
 from torch import Tensor
 
-from experiments.body.embedded import BODY_NAMES, load_body
-from experiments.synthesis.body_vector import POSE, STATE, rotations_from_6d, to_pose
-from experiments.synthesis.subgoal_net import LATENT_SIZE, SubgoalNet
+from experiments.body.embedded import load_body
+from experiments.synthesis.baselines import angles, nearest_segments, straight
+from experiments.synthesis.body_vector import POSE, STATE, rotations_from_6d
+from experiments.synthesis.subgoal_scores import subgoal_scores
 from experiments.synthesis.tasks import encoded
-from experiments.synthesis.training_set import TrainingSet, turned_vectors
+from experiments.synthesis.training_set import TrainingSet
 from experiments.synthesis.weights import SynthesisNets
 
 SEGMENTS = 600
 """At most so many held-out windows, evenly spread, are scored."""
-BODIES = 300
-"""Held-out sub-goals of each kind that are scored."""
-SAMPLES = 10
 _ENDS = [0, 61]
 _BETWEEN = slice(1, 61)
-_TOUCH_M = 0.05
 _BLOCK = 60
 
 
@@ -52,19 +48,6 @@ class PoseScore:
     angle_deg: float
     position_cm: float
     """Joint positions relative to the root, root orientation left out."""
-
-
-@dataclass(frozen=True)
-class SubgoalScore:
-    """Bodies for given places: mean over held-out places of one kind."""
-
-    angle_deg: float
-    best_angle_deg: float
-    """Of the best of `SAMPLES` samples."""
-    depth_cm: float
-    """Deepest vertex inside something."""
-    touching: float
-    """Share of bodies that have buttocks, thighs, back or hands within 5 cm of something."""
 
 
 @dataclass(frozen=True)
@@ -134,36 +117,6 @@ def kind_groups(
     return groups
 
 
-def straight(true: Float[Tensor, "B 62 135"]) -> Float[Tensor, "B 60 135"]:
-    """The trivial synthesis: translation linear, every rotation on its shortest arc at even speed."""
-    share = torch.arange(1, 61, dtype=true.dtype) / 61
-    first, last = true[:, :1], true[:, 61:]
-    transl = first[..., :3] + share[:, None] * (last[..., :3] - first[..., :3])
-    start, end = (_matrices(side[:, 0, 3:]) for side in (first, last))
-    arc = roma.rotmat_to_rotvec(start.transpose(-1, -2) @ end)
-    steps = roma.rotvec_to_rotmat(share[None, :, None, None] * arc[:, None])
-    turned = (start[:, None] @ steps)[..., :2].transpose(-1, -2)
-    return torch.cat([transl, turned.flatten(2)], dim=-1)
-
-
-def nearest_segments(
-    train: TrainingSet, true: Float[Tensor, "B 62 135"]
-) -> Float[Tensor, "B 60 135"]:
-    """The training segment whose two ends are most alike, turned and shifted to start at the start.
-
-    Alike: root way and turn seen from the start, heights, and both end poses.
-    """
-    windows = np.unique(train.data.window[train.moving])
-    local = _at_origin(train._local[torch.as_tensor(windows)].float())
-    wanted = _at_origin(true)
-    nearest = torch.cdist(_ends_code(wanted), _ends_code(local)).argmin(dim=1)
-    found = local[nearest][:, _BETWEEN]
-    zero = torch.zeros((len(true), 3))
-    moved = turned_vectors(found, zero, _heading(true[:, 0]), zero)
-    flat = torch.cat([true[:, 0, :2], zero[:, :1]], dim=1)
-    return torch.cat([moved[..., :3] + flat[:, None], moved[..., 3:]], dim=-1)
-
-
 def route_score(
     data: TrainingSet,
     placements: Integer[np.ndarray, " B"],
@@ -172,7 +125,7 @@ def route_score(
 ) -> RouteScore:
     """Errors of root states."""
     error = 100 * (route[..., :3] - true[:, _BETWEEN, :3]).norm(dim=-1)
-    turn = _angles(route[..., 3:9], true[:, _BETWEEN, 3:9])
+    turn = angles(route[..., 3:9], true[:, _BETWEEN, 3:9])
     rest = data._rest[torch.as_tensor(data.body_of(placements))]
     near = []
     for row, room in enumerate(data.room_of(placements).tolist()):
@@ -189,7 +142,7 @@ def route_score(
 def pose_score(true: Float[Tensor, "B 62 135"], pose: Float[Tensor, "B 60 126"]) -> PoseScore:
     """Errors of joint rotations, and of joint positions on one body with its root held upright."""
     wanted = true[:, _BETWEEN, POSE]
-    angle = _angles(pose, wanted)
+    angle = angles(pose, wanted)
     gaps = [
         (_joints(pose[part]) - _joints(wanted[part])).norm(dim=-1).mean(dim=(1, 2))
         for part in _blocks(len(true))
@@ -197,156 +150,8 @@ def pose_score(true: Float[Tensor, "B 62 135"], pose: Float[Tensor, "B 60 126"])
     return PoseScore(float(angle.mean()), 100 * float(torch.cat(gaps).mean()))
 
 
-def subgoal_scores(
-    net: SubgoalNet, train: TrainingSet, held: TrainingSet
-) -> dict[str, dict[str, Any]]:
-    """Samples of the sub-goal network by kind of place, beside the mean pose and the nearest state."""
-    rng = np.random.default_rng(7)
-    pool = train.subgoals(rng, 4000)
-    known = _bodies(train, *pool)
-    table: dict[str, dict[str, Any]] = {}
-    placements, frames = held.subgoals(rng, 4 * BODIES)
-    support = held.data.support[held.data.window[placements]]
-    for index, name in enumerate(("standing", "seated or lying", "touching")):
-        rows = np.flatnonzero(support == index)[:BODIES]
-        if len(rows):
-            chosen = placements[rows]
-            body = _bodies(held, chosen, frames[rows])
-            table[name] = _subgoal_row(net, held, chosen, body, known)
-    return table
-
-
-def sampled_bodies(
-    net: SubgoalNet,
-    data: TrainingSet,
-    placements: Integer[np.ndarray, " B"],
-    body: Float[Tensor, "B 135"],
-    latent: Float[Tensor, "B 32"],
-) -> Float[Tensor, "B 135"]:
-    """One body for every root state and room, of these latent vectors."""
-    shape = data.descriptors[torch.as_tensor(data.body_of(placements))]
-    with torch.no_grad():
-        feature = encoded(net.scene, data, data.room_of(placements))
-        return net.sample(feature, body[:, STATE], shape, latent)
-
-
-def _subgoal_row(
-    net: SubgoalNet,
-    data: TrainingSet,
-    placements: Integer[np.ndarray, " B"],
-    body: Float[Tensor, "B 135"],
-    known: Float[Tensor, "K 135"],
-) -> dict[str, Any]:
-    generator = torch.Generator().manual_seed(7)
-    samples = [
-        sampled_bodies(
-            net, data, placements, body, torch.randn(len(body), LATENT_SIZE, generator=generator)
-        )
-        for _ in range(SAMPLES)
-    ]
-    mean = torch.cat([body[:, STATE], known[:, POSE].mean(0).expand(len(body), -1)], dim=1)
-    code, codes = _tilt_code(body), _tilt_code(known)
-    near = known[torch.cdist(code, codes).argmin(dim=1)]
-    near = torch.cat([body[:, STATE], near[:, POSE]], dim=1)
-    rivals = {"network": samples, "mean pose": [mean], "nearest state": [near], "truth": [body]}
-    return {
-        name: asdict(_subgoal_score(data, placements, body, guesses))
-        for name, guesses in rivals.items()
-    }
-
-
-def _subgoal_score(
-    data: TrainingSet,
-    placements: Integer[np.ndarray, " B"],
-    body: Float[Tensor, "B 135"],
-    guesses: list[Float[Tensor, "B 135"]],
-) -> SubgoalScore:
-    angles = torch.stack([_angles(guess[:, POSE], body[:, POSE]).mean(-1) for guess in guesses])
-    depth, touching = _against_room(data, placements, guesses[0])
-    return SubgoalScore(
-        angle_deg=float(angles.mean()),
-        best_angle_deg=float(angles.amin(dim=0).mean()),
-        depth_cm=100 * float(depth.mean()),
-        touching=float((touching < _TOUCH_M).float().mean()),
-    )
-
-
-def _against_room(
-    data: TrainingSet, placements: Integer[np.ndarray, " B"], vectors: Float[Tensor, "B 135"]
-) -> tuple[Float[Tensor, " B"], Float[Tensor, " B"]]:
-    """Depth of the deepest vertex, and distance of the touching part nearest to a surface, metres."""
-    deepest, nearest = torch.zeros(len(vectors)), torch.zeros(len(vectors))
-    regions = ("back", "buttocks", "thigh_backs", "left_hand", "right_hand")
-    bodies, rooms = data.body_of(placements), data.room_of(placements)
-    for row in range(len(vectors)):
-        body = load_body(BODY_NAMES[bodies[row]])
-        touching = np.concatenate([body.regions[name][::8] for name in regions])
-        ids = np.concatenate([touching, body.subset])
-        points = body.posed(*to_pose(vectors[row : row + 1]), ids).vertices[0]
-        distance = data.rooms[int(rooms[row])].lookup.distance(points)
-        deepest[row] = (-distance.min()).clamp(min=0)
-        nearest[row] = distance[: len(touching)].abs().min()
-    return deepest, nearest
-
-
-def _bodies(
-    data: TrainingSet, placements: Integer[np.ndarray, " B"], frames: Integer[np.ndarray, " B"]
-) -> Float[Tensor, "B 135"]:
-    parts = []
-    for part in np.array_split(np.arange(len(frames)), max(1, len(frames) // 256)):
-        vectors = data.vectors(placements[part], np.zeros(len(part), dtype=np.int64))
-        parts.append(vectors[torch.arange(len(part)), torch.as_tensor(frames[part])])
-    return torch.cat(parts)
-
-
-def _tilt_code(vectors: Float[Tensor, "B 135"]) -> Float[Tensor, "B 4"]:
-    """What a root state tells of a body without its place and heading: height and tilt."""
-    matrix = _matrices(vectors[:, 3:9])[:, 0]
-    return torch.cat([vectors[:, 2:3], matrix[:, 2]], dim=1)
-
-
-def _ends_code(local: Float[Tensor, "B 62 135"]) -> Float[Tensor, "B 262"]:
-    """Numbers that are alike where two windows begin and end alike."""
-    first, last = local[:, 0], local[:, 61]
-    states = torch.cat([first[:, 2:3], last[:, :9]], dim=1)
-    poses = torch.cat([first[:, 9:], last[:, 9:]], dim=1)
-    return torch.cat([2.0 * states, 0.3 * poses], dim=1)
-
-
-def _at_origin(vectors: Float[Tensor, "B T 135"]) -> Float[Tensor, "B T 135"]:
-    """Windows that start at x = y = 0 with heading 0."""
-    zero = torch.zeros((len(vectors), 3))
-    flat = torch.cat([vectors[:, 0, :2], zero[:, :1]], dim=1)[:, None]
-    moved = torch.cat([vectors[..., :3] - flat, vectors[..., 3:]], dim=-1)
-    return turned_vectors(moved, zero, -_heading(vectors[:, 0]), zero)
-
-
-def _heading(vectors: Float[Tensor, "B 135"]) -> Float[Tensor, " B"]:
-    """Where the pelvis faces: 0 along -y, counter-clockwise, radians."""
-    facing = _matrices(vectors[:, 3:9])[:, 0, :, 2]
-    return torch.atan2(facing[:, 0], -facing[:, 1])
-
-
 def _blocks(count: int) -> list[slice]:
     return [slice(start, start + _BLOCK) for start in range(0, count, _BLOCK)]
-
-
-def _matrices(columns: Float[Tensor, "B N"]) -> Float[Tensor, "B J 3 3"]:
-    pair = columns.reshape(len(columns), -1, 2, 3).transpose(-1, -2)
-    matrices: Tensor = roma.special_gramschmidt(pair, epsilon=1e-8)
-    return matrices
-
-
-def _angles(one: Float[Tensor, "*B N"], two: Float[Tensor, "*B N"]) -> Float[Tensor, "*B J"]:
-    """Angle between rotations given as 6D columns, degrees."""
-    pairs = [
-        roma.special_gramschmidt(
-            side.reshape(*side.shape[:-1], -1, 2, 3).transpose(-1, -2), epsilon=1e-8
-        )
-        for side in (one, two)
-    ]
-    angle: Tensor = torch.rad2deg(roma.rotmat_geodesic_distance(*pairs))
-    return angle
 
 
 def _joints(pose: Float[Tensor, "B T 126"]) -> Float[Tensor, "B T 22 3"]:

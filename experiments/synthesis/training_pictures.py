@@ -10,9 +10,11 @@ import torch
 from jaxtyping import Float
 
 from experiments.body.embedded import BODY_NAMES, load_body
+from experiments.body.model import PARENTS
 from experiments.synthesis.body_vector import to_pose
-from experiments.synthesis.held_out_scores import predicted_segments, sampled_bodies, spread
+from experiments.synthesis.held_out_scores import predicted_segments, spread
 from experiments.synthesis.subgoal_net import LATENT_SIZE
+from experiments.synthesis.subgoal_scores import sampled_bodies
 from experiments.synthesis.training import CurveRow
 from experiments.synthesis.training_rooms import training_scene
 from experiments.synthesis.training_set import TrainingSet
@@ -47,6 +49,27 @@ def draw_routes(nets: SynthesisNets, held: TrainingSet, target: Path, count: int
         axis.plot(true[:, 0], true[:, 1], "k", lw=2)
         axis.plot(true[[0, 61], 0], true[[0, 61], 1], "ko", ms=5)
         axis.plot(route[:, 0], route[:, 1], "r", lw=2)
+    _save(figure, target)
+
+
+def draw_poses(nets: SynthesisNets, held: TrainingSet, target: Path, count: int = 4) -> None:
+    """Stick figures of held-out segments: recorded grey, the networks' red; time runs to the right."""
+    segments = predicted_segments(nets, held, spread(held.moving, count + 2)[1:-1])
+    made = torch.cat([segments.route, segments.pose], dim=-1)
+    figure, axes = _figure(count, 1, (11.0, 2.4 * count))
+    body = load_body("male_slim")
+    for row, axis in enumerate(axes):
+        for place, frame in enumerate(range(4, 60, 8)):
+            pairs = ((segments.true[row, frame + 1], "0.6"), (made[row, frame], "tab:red"))
+            for vector, colour in pairs:
+                _, joints = body.joint_transforms(*to_pose(vector[None]))
+                points = joints[0].numpy() - joints[0, :1].numpy() * np.array([1.0, 1.0, 0.0])
+                for joint, parent in enumerate(PARENTS):
+                    if parent >= 0:
+                        bone = points[[parent, joint]]
+                        across = 0.7 * bone[:, 0] + 0.7 * bone[:, 1]
+                        axis.plot(place + across, bone[:, 2], color=colour, lw=1.5)
+        axis.set(aspect="equal", xticks=[], ylim=(-0.1, 1.9))
     _save(figure, target)
 
 

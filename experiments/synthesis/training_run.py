@@ -11,7 +11,12 @@ from experiments.synthesis.held_out_scores import held_out_scores
 from experiments.synthesis.learning_curve import AmountRow, learning_curve
 from experiments.synthesis.placed_windows import DataSettings, PlacedWindows, training_windows
 from experiments.synthesis.training import CurveRow, Plan, train_synthesis
-from experiments.synthesis.training_pictures import draw_bodies, draw_curves, draw_routes
+from experiments.synthesis.training_pictures import (
+    draw_bodies,
+    draw_curves,
+    draw_poses,
+    draw_routes,
+)
 from experiments.synthesis.training_set import TrainingSet
 from experiments.synthesis.weights import KINDS, Kind, weights_file
 from renderer.files import atomic_path, write_json
@@ -42,6 +47,7 @@ def run_training(
         )
         record["amounts"] = [dataclasses.asdict(row) for row in amounts]
         draw_routes(nets, held, folder / "routes.png")
+        draw_poses(nets, held, folder / "poses.png")
         draw_bodies(nets, held, folder / "bodies.png")
         with atomic_path(folder / "report.md") as temporary:
             temporary.write_text(report_text(record), encoding="utf-8")

@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 import torch
 
+from experiments.synthesis.baselines import nearest_segments, straight
 from experiments.synthesis.body_vector import POSE, STATE, rotations_to_6d
-from experiments.synthesis.held_out_scores import (
-    kind_groups,
-    nearest_segments,
-    pose_score,
-    route_score,
-    spread,
-    straight,
-)
+from experiments.synthesis.held_out_scores import kind_groups, pose_score, route_score, spread
 from experiments.synthesis.placed_windows import PlacedWindows
 from experiments.synthesis.training_set import TrainingSet, turned_vectors
 

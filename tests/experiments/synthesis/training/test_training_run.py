@@ -72,7 +72,7 @@ def test_a_run_with_report_leaves_weights_curves_scores_and_pictures(
     assert set(record["held_out"]) == {"route", "pose", "subgoal"}
     assert len(record["amounts"]) == 3
     assert json.loads((tmp_path / "run.json").read_text()) == json.loads(json.dumps(record))
-    for name in ("curves.png", "routes.png", "bodies.png", "report.md"):
+    for name in ("curves.png", "routes.png", "poses.png", "bodies.png", "report.md"):
         assert (tmp_path / name).stat().st_size > 500
     assert all(weights_file(kind, tmp_path).is_file() for kind in KINDS)
 
