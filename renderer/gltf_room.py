@@ -29,7 +29,10 @@ JPEG_QUALITY = 90
 
 
 def room_glb(parts: Sequence[StagePart]) -> bytes:
-    """A binary glTF file of the room; `_OCCLUSION` carries the baked occlusion, 1 = open."""
+    """A binary glTF file of the room; `_OCCLUSION` carries the baked occlusion, 1 = open.
+
+    `_RELEASED_n` is how much that grows where the n-th group of the node's `extras.released` is hidden.
+    """
     glb = Glb()
     groups = sorted({part.group for part in parts})
     first_part = 1 + len(groups)
@@ -48,7 +51,10 @@ def room_glb(parts: Sequence[StagePart]) -> bytes:
             {"name": group, "children": members[group], "extras": {"wall": walls[group]}}
             for group in groups
         ),
-        *({"name": part.instance, "mesh": index} for index, part in enumerate(parts)),
+        *(
+            {"name": part.instance, "mesh": index, "extras": {"released": sorted(part.released)}}
+            for index, part in enumerate(parts)
+        ),
     )
     return glb.to_bytes()
 
@@ -59,8 +65,10 @@ def _mesh(glb: Glb, part: StagePart, material: int) -> dict[str, Any]:
         "POSITION": part.corners.reshape(count, 3).astype("<f4"),
         "NORMAL": _unit(part.normals.reshape(count, 3)),
         "COLOR_0": _colours(part.colours.reshape(count, 3)),
-        "_OCCLUSION": np.round(part.occlusion.reshape(count, 1).clip(0, 1) * 255).astype(np.uint8),
+        "_OCCLUSION": _eighth(part.occlusion),
     }
+    for number, group in enumerate(sorted(part.released)):
+        columns[f"_RELEASED_{number}"] = _eighth(part.released[group])
     if part.uv is not None:
         # Images start at the top in glTF, at the bottom in our texture coordinates.
         columns["TEXCOORD_0"] = (part.uv.reshape(count, 2) * (1, -1) + (0, 1)).astype("<f4")
@@ -74,6 +82,11 @@ def _mesh(glb: Glb, part: StagePart, material: int) -> dict[str, Any]:
     index = triangles[~lines].reshape(-1)
     indices = glb.accessor(smallest_indices(index), ELEMENT_ARRAY_BUFFER)
     return {"primitives": [{"attributes": attributes, "indices": indices, "material": material}]}
+
+
+def _eighth(share: Float[np.ndarray, "F 3"]) -> UInt8[np.ndarray, "N 1"]:
+    """Shares in [0, 1] in eight bits."""
+    return np.round(share.reshape(-1, 1).clip(0, 1) * 255).astype(np.uint8)
 
 
 def _shared(

@@ -194,6 +194,16 @@ def test_what_disappears_together_is_one_node(synthetic: Any) -> None:
     assert groups["wall:e"]["extras"] == {"wall": "e"}
 
 
+def test_light_released_by_a_hidden_thing_is_kept_by_name(synthetic: Any) -> None:
+    floor = synthetic.parts[0]
+    gain = np.linspace(0, 1, floor.occlusion.size).reshape(floor.occlusion.shape)
+    lit = dataclasses.replace(floor, released={"object:wardrobe": gain.astype(np.float32)})
+    reader = Reader(room_glb([lit]))
+    assert reader.json["nodes"][-1]["extras"] == {"released": ["object:wardrobe"]}
+    stored = reader.attributes()["_RELEASED_0"][reader.triangles()][..., 0]
+    assert np.abs(stored - gain).max() <= 0.501 / 255
+
+
 def test_equal_input_gives_equal_bytes(synthetic: Any) -> None:
     assert room_glb(synthetic.parts) == room_glb(synthetic.parts)
     assert skinned_glb(arm()) == skinned_glb(arm())

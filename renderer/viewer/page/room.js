@@ -32,7 +32,13 @@ export class Room {
         const primitive = glb.json.meshes[part.mesh].primitives[0];
         const mesh = new Mesh(readGeometry(glb, primitive), solid[primitive.material]);
         mesh.name = part.name;
-        mesh.userData = { solid: solid[primitive.material], xray: xray[primitive.material] };
+        mesh.userData = {
+          solid: solid[primitive.material],
+          xray: xray[primitive.material],
+          open: mesh.geometry.attributes.occlusion.array.slice(),
+          released: new Map((part.extras?.released ?? []).map((name, n) => [
+            name, glb.accessor(primitive.attributes[`_RELEASED_${n}`]).array])),
+        };
         mesh.castShadow = !manifest.light.no_shadow_from.includes(node.name);
         mesh.receiveShadow = true;
         group.add(mesh);
@@ -56,6 +62,24 @@ export class Room {
         : this.mode === "cutaway" && group.visible && tall && !touched && hides(eye, body, group);
       const kind = fades ? "xray" : "solid";
       for (const mesh of group.children) mesh.material = mesh.userData[kind];
+    }
+    this.#relight();
+  }
+
+  /** Where furniture is hidden, no dark patch stays behind. */
+  #relight() {
+    const gone = this.groups.filter((group) => !group.visible).map((group) => group.name);
+    if (gone.join() === this.gone) return;
+    this.gone = gone.join();
+    for (const mesh of this.groups.flatMap((group) => group.children)) {
+      const gained = gone.filter((name) => mesh.userData.released.has(name)).map((name) => mesh.userData.released.get(name));
+      if (gained.length === 0 && !mesh.userData.relit) continue;
+      mesh.userData.relit = gained.length > 0;
+      const occlusion = mesh.geometry.attributes.occlusion;
+      mesh.userData.open.forEach((open, i) => {
+        occlusion.array[i] = Math.min(255, gained.reduce((sum, values) => sum + values[i], open));
+      });
+      occlusion.needsUpdate = true;
     }
   }
 
@@ -101,6 +125,7 @@ function readGeometry(glb, primitive) {
   const names = { POSITION: "position", NORMAL: "normal", COLOR_0: "color", TEXCOORD_0: "uv", _OCCLUSION: "occlusion" };
   const geometry = new BufferGeometry();
   for (const [name, index] of Object.entries(primitive.attributes)) {
+    if (!(name in names)) continue;
     const { array, width, normalized } = glb.accessor(index);
     geometry.setAttribute(names[name], new BufferAttribute(array, width, normalized));
   }
