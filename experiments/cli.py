@@ -16,6 +16,13 @@ _OUT = click.option("--out", type=click.Path(path_type=Path), required=True, hel
 _JOBS = click.option(
     "--jobs", type=click.IntRange(1), default=2, show_default=True, help="Processes."
 )
+_DEVICE = click.option(
+    "--device",
+    type=click.Choice(["cpu", "cuda"]),
+    default="cpu",
+    show_default=True,
+    help="Where placements are computed.",
+)
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
@@ -28,15 +35,16 @@ def stimuli() -> None:
 @click.argument("config", type=click.Path(path_type=Path))
 @_OUT
 @_JOBS
+@_DEVICE
 @_JSON
-def build(config: Path, out: Path, jobs: int, as_json: bool) -> None:
+def build(config: Path, out: Path, jobs: int, device: str, as_json: bool) -> None:
     """Place and render everything CONFIG asks for; go on where an earlier run stopped."""
     from experiments.config import read_config
     from experiments.pipeline import build_set
 
     with progress_bars(f"{sys.argv[0]} stimuli build {config} --out {out}") as progress:
         settings = read_config(config)
-        outcome = build_set(settings, out, jobs, progress)
+        outcome = build_set(settings, out, jobs, progress, device)
     record = {
         "catalogue": str(out / "catalogue.json"),
         "placements": outcome.placements,
@@ -82,15 +90,16 @@ def table(folder: Path, as_json: bool) -> None:
 @click.argument("config", type=click.Path(path_type=Path))
 @_OUT
 @_JOBS
+@_DEVICE
 @_JSON
-def evaluate(config: Path, out: Path, jobs: int, as_json: bool) -> None:
+def evaluate(config: Path, out: Path, jobs: int, device: str, as_json: bool) -> None:
     """Place, score and compare everything CONFIG asks for, without rendering."""
     from experiments.config import read_config
     from experiments.evaluate import evaluate_set, plausibility_table
 
     with progress_bars(f"{sys.argv[0]} evaluate {config} --out {out}") as progress:
         settings = read_config(config)
-        evaluation = evaluate_set(settings, out, jobs, progress)
+        evaluation = evaluate_set(settings, out, jobs, progress, device)
     record = {"methods": evaluation["methods"], "table": str(out / "table.md")}
     used = len(evaluation["conditions"]["motions"])
     text = plausibility_table(evaluation) + _too_few(used, settings.motions_wanted)

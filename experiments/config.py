@@ -19,7 +19,7 @@ class PlacementConfig:
     """How methods are run."""
 
     preset: str = "default"
-    """Name of a `PlacementSettings` preset: fast, default or paper."""
+    """Name of a `PlacementSettings` preset: fast, default, paper or posa."""
     full_preset: str = "default"
     """`evaluate` also places some motions with this fuller preset, see `full_motions`."""
     full_motions: int = 0

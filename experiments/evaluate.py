@@ -41,7 +41,11 @@ COLUMNS: tuple[tuple[str, str, int], ...] = (
 
 
 def evaluate_set(
-    config: StimulusSetConfig, out: Path, jobs: int = 2, progress: Progress = lambda *_: None
+    config: StimulusSetConfig,
+    out: Path,
+    jobs: int = 2,
+    progress: Progress = lambda *_: None,
+    device: str = "cpu",
 ) -> dict[str, Any]:
     """Place and score everything a configuration asks for, and compare; goes on where it stopped.
 
@@ -51,9 +55,15 @@ def evaluate_set(
     from experiments.pipeline import place_set
 
     fuller = full_config(config)
-    folder = place_set(config, out, jobs, progress)
+    folder = place_set(config, out, jobs, progress, device)
     if fuller is not None:
-        place_set(fuller, out / FULL_FOLDER, jobs, lambda s, d, n: progress(f"{s} (full)", d, n))
+        place_set(
+            fuller,
+            out / FULL_FOLDER,
+            jobs,
+            lambda s, d, n: progress(f"{s} (full)", d, n),
+            device,
+        )
     evaluation = write_evaluation(config, folder)
     with atomic_path(out / TABLE_NAME) as temporary:
         temporary.write_text(comparison_markdown(evaluation), encoding="utf-8")

@@ -46,6 +46,8 @@ class PlaceJob:
     scene: str
     motion_id: str
     method: str
+    device: str = "cpu"
+    """No part of the hash: another device computes the same placement."""
 
     def input_hash(self) -> str:
         """What the placement depends on."""
@@ -165,7 +167,8 @@ def run_place(job: PlaceJob) -> str:
         "sdf_cell_m": scene.volumes.cell,
     }
     try:
-        settings = PRESETS[job.config.placement.preset]
+        preset = PRESETS[job.config.placement.preset]
+        settings = dataclasses.replace(preset, device=job.device)
         method = METHODS[job.method]
         placement = method.place(motion, scene, body, settings, job.config.seed)
     except PlacementError as error:

@@ -37,13 +37,17 @@ class BuildOutcome:
 
 
 def build_set(
-    config: StimulusSetConfig, out: Path, jobs: int = 2, progress: Progress = lambda *_: None
+    config: StimulusSetConfig,
+    out: Path,
+    jobs: int = 2,
+    progress: Progress = lambda *_: None,
+    device: str = "cpu",
 ) -> BuildOutcome:
     """Build or complete a stimulus set in `out`; needs no set-up beyond the configuration.
 
     Raises `InputError` for unknown scenes, motions or methods before anything is computed.
     """
-    folder = place_set(config, out, jobs, progress)
+    folder = place_set(config, out, jobs, progress, device)
     folder.sweep()
     drops = folder.drops()
     renders = [job for job in render_jobs(config, folder) if job.key not in drops]
@@ -62,20 +66,27 @@ def build_set(
 
 
 def place_set(
-    config: StimulusSetConfig, out: Path, jobs: int = 2, progress: Progress = lambda *_: None
+    config: StimulusSetConfig,
+    out: Path,
+    jobs: int = 2,
+    progress: Progress = lambda *_: None,
+    device: str = "cpu",
 ) -> SetFolder:
     """Prepare rooms and motions, then place and score every combination; render nothing."""
+    from experiments.placement.devices import require_device
+
+    require_device(device)
     validate_names(config)
     folder = SetFolder(out)
     folder.motion_ids(config)  # an empty folder of motions is refused before anything is computed
     folder.claim(config)
     prepares = [PrepareJob(config, scene) for scene in config.scenes]
     run_all(run_prepare, prepares, jobs, "prepare rooms", progress)
-    run_all(run_place, place_jobs(config, folder), jobs, "place", progress)
+    run_all(run_place, place_jobs(config, folder, device), jobs, "place", progress)
     return folder
 
 
-def place_jobs(config: StimulusSetConfig, folder: SetFolder) -> list[PlaceJob]:
+def place_jobs(config: StimulusSetConfig, folder: SetFolder, device: str = "cpu") -> list[PlaceJob]:
     """One job a (scene, motion, method); methods outside the study may take fewer motions."""
     motion_ids = folder.motion_ids(config)
     limit = config.other_methods_motions or len(motion_ids)
@@ -84,9 +95,10 @@ def place_jobs(config: StimulusSetConfig, folder: SetFolder) -> list[PlaceJob]:
         for index, motion_id in enumerate(motion_ids):
             for method in config.methods:
                 if method in config.study_methods or index < limit:
-                    found.append(PlaceJob(config, folder.path, scene, motion_id, method))
+                    found.append(PlaceJob(config, folder.path, scene, motion_id, method, device))
         for motion_id in extra_motions(config):
-            found.append(PlaceJob(config, folder.path, scene, motion_id, config.study_methods[-1]))
+            method = config.study_methods[-1]
+            found.append(PlaceJob(config, folder.path, scene, motion_id, method, device))
     return found
 
 

@@ -36,7 +36,9 @@ class SkinnedBody:
     """Pose blend shapes (SMPL, Loper et al. 2015, eq. 9): metres per entry of R_1..R_21 - I."""
     n_vertices: int = field(init=False)
     """Number of vertices V of the full mesh."""
-    _tensors: dict[tuple[str, torch.dtype], Tensor] = field(default_factory=dict, repr=False)
+    _tensors: dict[tuple[str, torch.dtype, torch.device], Tensor] = field(
+        default_factory=dict, repr=False
+    )
 
     def __post_init__(self) -> None:
         self.n_vertices = len(self.points)
@@ -59,16 +61,19 @@ class SkinnedBody:
     ) -> BodyMesh:
         """Skin the vertices named (all if None); see `BodyModel.posed`.
 
-        Computed in the precision of `pose`. The vertices are a permuted (not contiguous) view.
+        Computed in the precision and on the device of `pose`. The vertices are a permuted view
+        (not contiguous).
         """
         rotations, positions = self.joint_transforms(pose, transl)
-        rest_joints = self._tensor("rest_joints", pose.dtype)
-        rows = None if vertex_ids is None else torch.as_tensor(vertex_ids, dtype=torch.int64)
-        points = self._rows("points", pose.dtype, rows)
+        rest_joints = self._tensor("rest_joints", pose)
+        rows = (
+            None if vertex_ids is None else torch.as_tensor(vertex_ids).to(pose.device, torch.int64)
+        )
+        points = self._rows("points", pose, rows)
         translations = joint_translations(rotations, positions, rest_joints)
         vertices = skin(points, rotations, translations)
         if self.pose_offsets is not None:
-            offsets = self._rows("pose_offsets", pose.dtype, rows)
+            offsets = self._rows("pose_offsets", pose, rows)
             vertices = vertices + _pose_correction(points, offsets, pose, rotations)
         return BodyMesh(vertices, positions, self._faces_of(vertex_ids))
 
@@ -76,7 +81,7 @@ class SkinnedBody:
         self, pose: Float[Tensor, "T 22 3"], transl: Float[Tensor, "T 3"]
     ) -> tuple[Float[Tensor, "T 22 3 3"], Float[Tensor, "T 22 3"]]:
         """World rotation and position (metres) of every joint."""
-        return forward_kinematics(pose, transl, self._tensor("rest_joints", pose.dtype))
+        return forward_kinematics(pose, transl, self._tensor("rest_joints", pose))
 
     def _faces_of(self, vertex_ids: Integer[np.ndarray, " V"] | None) -> Integer[np.ndarray, "F 3"]:
         if vertex_ids is None:
@@ -85,16 +90,17 @@ class SkinnedBody:
             return self.subset_faces
         return np.zeros((0, 3), dtype=self.faces.dtype)
 
-    def _rows(self, array: str, dtype: torch.dtype, rows: Tensor | None) -> Tensor:
-        table = self._tensor(array, dtype)
+    def _rows(self, array: str, like: Tensor, rows: Tensor | None) -> Tensor:
+        table = self._tensor(array, like)
         return table if rows is None else table.index_select(0, rows)
 
-    def _tensor(self, array: str, dtype: torch.dtype) -> Tensor:
-        key = (array, dtype)
+    def _tensor(self, array: str, like: Tensor) -> Tensor:
+        """One of the arrays, in the precision and on the device of `like`."""
+        key = (array, like.dtype, like.device)
         if key not in self._tensors:
             values = np.asarray(getattr(self, array))
             flat = values if array == "rest_joints" else values.reshape(len(values), -1)
-            self._tensors[key] = torch.as_tensor(flat, dtype=dtype)
+            self._tensors[key] = torch.as_tensor(flat).to(like)
         return self._tensors[key]
 
 
@@ -106,7 +112,7 @@ def _pose_correction(
 ) -> Float[Tensor, "T V 3"]:
     """Pose blend shapes, carried to the posed frame by each vertex's blended rotation."""
     local = rotation_matrices(pose[:, 1:])
-    features = (local - torch.eye(3, dtype=pose.dtype)).flatten(1)
+    features = (local - torch.eye(3, dtype=pose.dtype, device=pose.device)).flatten(1)
     rest = torch.einsum("vaf,tf->tva", offsets.reshape(len(offsets), 3, -1), features)
     blended = torch.einsum("vj,tjab->tvab", points[:, 3::4], rotations)
     return (blended @ rest[..., None]).squeeze(-1)

@@ -90,7 +90,7 @@ def least_clearance(problem: Problem, fit: Fit) -> float:
 
 
 def _distance(problem: Problem, fit: Fit) -> Float[Tensor, "T V"]:
-    placed = torch.tensor([fit.yaw, *fit.translation], dtype=problem.k.dtype)
+    placed = problem.k.new_tensor([fit.yaw, *fit.translation])
     with torch.no_grad():
         bodies = altered_bodies(problem, placed, fit.delta, fit.shift)
         return problem.field.distance(bodies, problem.contact)
@@ -108,11 +108,11 @@ def to_placement(
 ) -> Placement:
     """The best fit as a record: the placed motion, its terms, and what it cost to find."""
     fit = best_fit(problem, fits)
-    delta, shift = fit.delta.double().numpy(), fit.shift.double().numpy()
+    delta, shift = fit.delta.double().cpu().numpy(), fit.shift.double().cpu().numpy()
     whole = problem.whole or problem.motion
     motion = spread_alteration(whole, problem.motion, delta, shift)
-    centre = problem.centre.double().numpy()
-    contact = problem.contact.numpy()
+    centre = problem.centre.double().cpu().numpy()
+    contact = problem.contact.cpu().numpy()
     return Placement(
         scene=problem.scene.scene_id,
         motion_id=problem.motion.motion_id,

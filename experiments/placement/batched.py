@@ -6,8 +6,9 @@ a cell of the volume with a corner inside something. `reference` computes the sa
 
 from __future__ import annotations
 
+import numpy as np
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 from experiments.placement.losses import smoothed_depth
@@ -83,4 +84,11 @@ def _inside(problem: RigidProblem, points: Float[Tensor, "3 P"]) -> Int64[Tensor
     """Columns of the vertices without contact that may be inside something."""
     possible = problem.field.packed.possibly_inside(points)
     free = ~problem.contact.flatten()
-    return (possible.reshape(-1, len(free)) & free).flatten().nonzero().squeeze(1)
+    return _places((possible.reshape(-1, len(free)) & free).flatten())
+
+
+def _places(mask: Bool[Tensor, " P"]) -> Int64[Tensor, " M"]:
+    """Where a mask holds."""
+    if mask.is_cpu:  # numpy finds them six times as fast
+        return torch.from_numpy(np.flatnonzero(mask.numpy()))
+    return mask.nonzero().squeeze(1)

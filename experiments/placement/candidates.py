@@ -68,7 +68,7 @@ def start_grid(problem: Problem) -> Starts:
     lifts = np.array(settings.start_layers) + problem.scene.floor_z - problem.floor
     axes = np.meshgrid(yaws, x, y, lifts, indexing="ij")
     yaw, at_x, at_y, lift = (axis.ravel() for axis in axes)
-    centre = problem.centre.double().numpy()
+    centre = problem.centre.double().cpu().numpy()
     translation = np.stack([at_x - centre[0], at_y - centre[1], lift], axis=-1)
     starts = Starts(yaw, translation, np.zeros(len(yaw)))
     inside = np.array(
@@ -165,7 +165,7 @@ def coarse_scores(problem: RigidProblem, starts: Starts) -> Float[np.ndarray, " 
     others, which stand for all the rest.
     """
     frames = _spread(len(problem.k), problem.settings.coarse_frames)
-    ever = problem.contact.any(0).numpy()
+    ever = problem.contact.any(0).cpu().numpy()
     others = np.flatnonzero(~ever)
     chosen = others[_spread(len(others), problem.settings.coarse_vertices)]
     thin = problem.thinned(frames, np.concatenate([np.flatnonzero(ever), chosen]))
@@ -190,11 +190,11 @@ def class_match(problem: RigidProblem, starts: Starts) -> Float[np.ndarray, " N"
         return match
     beyond = problem.beyond_floor()
     for group in (beyond, problem.contact & ~beyond):
-        frames = np.flatnonzero(group.any(1))
+        frames = np.flatnonzero(group.any(1).cpu())
         if len(frames) == 0:
             continue
         frames = frames[_spread(len(frames), problem.settings.coarse_frames)]
-        columns = np.flatnonzero(group[frames].any(0))
+        columns = np.flatnonzero(group[frames].any(0).cpu())
         thin, asked = problem.thinned(frames, columns), group[frames][:, columns]
         found = _batched(thin, starts, partial(_share_right, thin, asked))
         match = np.minimum(match, found)
@@ -208,10 +208,10 @@ def bone_clearance(problem: Problem, starts: Starts) -> Float[np.ndarray, " N"]:
     least = np.zeros(len(starts))
     for begin in range(0, len(starts), batch):
         part = slice(begin, begin + batch)
-        yaw = torch.as_tensor(starts.yaw[part], dtype=bones.dtype)
-        translation = torch.as_tensor(starts.translation[part], dtype=bones.dtype)
+        yaw = torch.as_tensor(starts.yaw[part]).to(bones)
+        translation = torch.as_tensor(starts.translation[part]).to(bones)
         placed = move(bones, yaw, translation, problem.centre)
-        least[part] = problem.field.clearance(placed).amin(-1).double().numpy()
+        least[part] = problem.field.clearance(placed).amin(-1).double().cpu().numpy()
     return least
 
 
@@ -235,7 +235,7 @@ def _batched(
         yaw = torch.as_tensor(starts.yaw[part]).to(problem.k)
         translation = torch.as_tensor(starts.translation[part]).to(problem.k)
         with torch.no_grad():
-            scores[part] = score(problem.moved(yaw, translation)).double().numpy()
+            scores[part] = score(problem.moved(yaw, translation)).double().cpu().numpy()
     return scores
 
 
@@ -246,9 +246,9 @@ def _spread(length: int, count: int) -> Integer[np.ndarray, " M"]:
 
 
 def _stays_inside(problem: Problem, yaw: float, translation: Float[np.ndarray, "3"]) -> bool:
-    offset = problem.pelvis[:, :2] - problem.centre.double().numpy()
+    offset = problem.pelvis[:, :2] - problem.centre.double().cpu().numpy()
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    path = offset @ turn.T + problem.centre.double().numpy() + translation[:2]
+    path = offset @ turn.T + problem.centre.double().cpu().numpy() + translation[:2]
     margin = problem.settings.wall_clearance
     return bool((path >= margin).all() and (path <= np.array(_ground(problem)) - margin).all())
 

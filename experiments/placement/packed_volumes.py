@@ -50,27 +50,36 @@ class PackedVolumes:
         self, points: Float[Tensor, "3 P"], columns: Int64[Tensor, " M"]
     ) -> UInt8[Tensor, " M"]:
         """Class at the nearest node."""
-        node = self.clamp_(self.steps(points.index_select(1, columns))).round_()
-        return self.label.index_select(0, self.flat(node))
+        node = self.nodes(self.steps(points.index_select(1, columns)).round_())
+        return self.label.index_select(0, self.flat_(node))
 
     def possibly_inside(self, points: Float[Tensor, "3 P"]) -> Bool[Tensor, " P"]:
         """Points in cells one of whose corners is inside something: no other has a depth."""
-        return self.solid.index_select(0, self.flat(self.clamp_(self.steps(points))))
+        return self.solid.index_select(0, self.flat_(self.nodes(self.steps(points))))
 
     def steps(self, points: Float[Tensor, "3 M"]) -> Float[Tensor, "3 M"]:
         """Points in steps of the grid from its first node."""
         return torch.add(self._before[:, None], points, alpha=1.0 / self.cell)
 
-    def clamp_(self, position: Float[Tensor, "3 M"], short: int = 1) -> Float[Tensor, "3 M"]:
-        """Clamp positions in place to the grid less `short` nodes at its end."""
-        for row, size in zip(position, self.shape, strict=True):
-            row.clamp_(0, size - short)
-        return position
+    def clamped(self, steps: Float[Tensor, "3 M"]) -> Float[Tensor, "3 M"]:
+        """The nearest position inside the grid; what is not a number stays so."""
+        rows = zip(steps, self.shape, strict=True)
+        return torch.stack([row.clamp(0, size - 1) for row, size in rows])
 
-    def flat(self, position: Float[Tensor, "3 M"]) -> Integer[Tensor, " M"]:
-        """Place in a flattened volume of the node at or below a position."""
+    def nodes(self, steps: Float[Tensor, "3 M"], short: int = 1) -> Integer[Tensor, "3 M"]:
+        """The node below a position, inside the grid less `short` nodes at its end.
+
+        Clamped as integers: a position that is not a number must not lead out of the grid.
+        """
+        node = steps.to(self._index)
+        for row, size in zip(node, self.shape, strict=True):
+            row.clamp_(0, size - short)
+        return node
+
+    def flat_(self, node: Integer[Tensor, "3 M"]) -> Integer[Tensor, " M"]:
+        """Place of a node in a flattened volume; overwrites `node`."""
         _, depth, height = self.shape
-        i, j, k = position.to(self._index)
+        i, j, k = node
         return i.mul_(depth * height).add_(j, alpha=height).add_(k)
 
 
@@ -80,10 +89,10 @@ class _Trilinear(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, points: Any, columns: Any, first: Any, volumes: PackedVolumes) -> Any:
         steps = volumes.steps(points.index_select(1, columns))
-        position = volumes.clamp_(steps.clone())
-        node = volumes.clamp_(position.floor(), short=2)
+        position = volumes.clamped(steps)
+        node = volumes.nodes(position, short=2)
         x, y, z = position - node
-        corner = _corners(volumes, volumes.flat(node).add_(first))
+        corner = _corners(volumes, volumes.flat_(node).add_(first))
         along_z = corner[:, :, 1] - corner[:, :, 0]
         face = torch.addcmul(corner[:, :, 0], along_z, z)
         along_y = face[:, 1] - face[:, 0]

@@ -68,7 +68,8 @@ class RigidProblem:
         self, frames: Integer[np.ndarray, " F"], columns: Integer[np.ndarray, " W"]
     ) -> RigidProblem:
         """Some frames and vertices only, for scoring: the frames left stand for all."""
-        frame, column = torch.as_tensor(frames), torch.as_tensor(columns)
+        frame = torch.as_tensor(frames, device=self.k.device)
+        column = torch.as_tensor(columns, device=self.k.device)
         return RigidProblem(
             settings=self.settings,
             field=self.field,
@@ -113,7 +114,7 @@ class Problem(RigidProblem):
 
     def weighted(self, weights: FrameWeights) -> Problem:
         """The same with other frame weights."""
-        k = torch.as_tensor(weights.values, dtype=self.k.dtype)
+        k = torch.as_tensor(weights.values).to(self.k)
         return dataclasses.replace(self, weights=weights, k=k)
 
     def expected_classes(self, floor: bool = False) -> list[str]:
@@ -136,13 +137,14 @@ def build_problem(
     Without weights every frame counts alike.
     """
     weights = weights or uniform_weights(motion.n_frames)
-    pose = torch.as_tensor(motion.pose, dtype=dtype)
-    transl = torch.as_tensor(motion.transl, dtype=dtype)
+    device = torch.device(settings.device)
+    pose = torch.as_tensor(motion.pose, dtype=dtype, device=device)
+    transl = torch.as_tensor(motion.transl).to(pose)
     mesh = body.posed(pose, transl, features.vertex_ids)
-    pelvis = mesh.joints[:, 0].double().numpy()
-    lowest = mesh.vertices[..., 2].min(1).values.double().numpy()
-    contact = torch.as_tensor(features.contact > settings.contact_threshold)
-    classes = torch.as_tensor(features.semantics.argmax(-1), dtype=torch.int64)
+    pelvis = mesh.joints[:, 0].double().cpu().numpy()
+    lowest = mesh.vertices[..., 2].min(1).values.double().cpu().numpy()
+    contact = torch.as_tensor(features.contact > settings.contact_threshold, device=device)
+    classes = torch.as_tensor(features.semantics.argmax(-1), dtype=torch.int64, device=device)
     step_scale = time_step_scale(motion.times) if settings.time_aware else np.ones(len(pelvis))
     return Problem(
         motion=motion,
@@ -151,7 +153,7 @@ def build_problem(
         settings=settings,
         features=features,
         weights=weights,
-        field=SceneField(scene, dtype),
+        field=SceneField(scene, dtype, device),
         pose=pose,
         transl=transl,
         vertices=coordinate_major(mesh.vertices),
@@ -159,9 +161,9 @@ def build_problem(
         bones=bone_points(mesh.joints),
         contact=contact,
         wanted=torch.where(contact, classes, 0),
-        k=torch.as_tensor(weights.values, dtype=dtype),
-        step_scale=torch.as_tensor(step_scale, dtype=dtype),
-        centre=torch.as_tensor(clip_centre(pelvis), dtype=dtype),
+        k=torch.as_tensor(weights.values).to(pose),
+        step_scale=torch.as_tensor(step_scale).to(pose),
+        centre=torch.as_tensor(clip_centre(pelvis)).to(pose),
         floor=clip_floor(lowest),
     )
 

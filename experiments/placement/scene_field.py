@@ -11,7 +11,8 @@ from experiments.placement.packed_volumes import PackedVolumes
 from experiments.scene.lookup import SceneLookup
 from experiments.scene.scene import MPCAT40, N_CLASSES, Scene
 
-_NO_CLASS = (MPCAT40.index("void"), MPCAT40.index("unlabeled"))
+_BLANK = [MPCAT40.index(name) for name in ("void", "unlabeled")]
+_SHELL = [MPCAT40.index(name) for name in ("wall", "floor", "ceiling")]
 
 
 class SceneField:
@@ -62,10 +63,10 @@ class SceneField:
 
 def semantics_off(scene: Scene) -> str:
     """Why the classes of a scene cannot be compared with expected ones; empty if they can."""
-    present = np.unique(scene.volumes.label)
-    if np.isin(present, _NO_CLASS).all():
-        return "the scene has no labels"
-    unknown = present[present >= N_CLASSES].tolist()
-    if unknown:
+    present = np.flatnonzero(np.bincount(scene.volumes.label.ravel()))
+    unknown = present[present >= N_CLASSES]
+    if len(unknown):
         return f"the scene has classes outside mpcat40 ({', '.join(map(str, unknown))})"
+    if np.isin(present, _BLANK).any() and np.isin(present, _BLANK + _SHELL).all():
+        return "no object of the scene has a label"
     return ""

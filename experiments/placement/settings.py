@@ -181,4 +181,5 @@ PRESETS: dict[str, PlacementSettings] = {
 }
 """Named settings: `fast` for demonstrations and tests, `default`, `paper` as near to the printed
 method as its text allows, and `posa`: that with the search and the frame-by-frame engine of POSA's
-code (four yaws, three layers, 20 inner iterations, every start scored exactly); half an hour a placement and more."""
+code (four yaws, three layers, 20 inner iterations, every start scored exactly): half an hour a
+placement and more."""

@@ -130,21 +130,20 @@ class _Variables:
 
     def __init__(self, problem: Problem, rigid: Fit) -> None:
         self._origin, self._scale = _rigid_state(problem, rigid.yaw, rigid.translation)
-        dtype = self._origin.dtype
         basis = alteration_basis(
-            problem.stiffness.double().numpy(),
-            problem.step_scale.double().numpy(),
+            problem.stiffness.double().cpu().numpy(),
+            problem.step_scale.double().cpu().numpy(),
             problem.settings,
         )
-        self._pose = torch.as_tensor(basis.pose, dtype=dtype)
-        self._translation = torch.as_tensor(basis.translation, dtype=dtype)
+        self._pose = torch.as_tensor(basis.pose).to(self._origin)
+        self._translation = torch.as_tensor(basis.translation).to(self._origin)
         self._delta, self._shift = rigid.delta, rigid.shift
         self._n_pose = basis.pose.shape[1] * 66
 
     def start(self) -> Float[Tensor, " N"]:
         """The state of the fit it was made from."""
         length = 4 + self._n_pose + self._translation.shape[1] * 3
-        return torch.zeros(length, dtype=self._origin.dtype)
+        return self._origin.new_zeros(length)
 
     def decode(
         self, state: Float[Tensor, " N"]
@@ -188,12 +187,12 @@ def _rigid_state(
     metre = float((attraction.sum() + 1.0).rsqrt())
     reach = problem.vertices[..., :2] - problem.centre
     radius = float(reach.square().sum(-1).mean().sqrt().clamp(min=0.3))
-    origin = torch.tensor([yaw, *translation], dtype=problem.k.dtype)
-    return origin, torch.tensor([metre / radius, metre, metre, metre], dtype=problem.k.dtype)
+    origin = problem.k.new_tensor([yaw, *translation])
+    return origin, origin.new_tensor([metre / radius, metre, metre, metre])
 
 
 def _rigid_tensor(problem: Problem, fit: Fit) -> Float[Tensor, "4"]:
-    return torch.tensor([fit.yaw, *fit.translation], dtype=problem.k.dtype)
+    return problem.k.new_tensor([fit.yaw, *fit.translation])
 
 
 def _unaltered(problem: Problem) -> tuple[Float[Tensor, "T 22 3"], Float[Tensor, "T 3"]]:
@@ -214,7 +213,7 @@ def _fit(
         costs = alteration_terms(delta, shift, problem.stiffness, problem.step_scale, weights)
         extra = Steadiness(problem, weights).terms(bodies, placed, delta, shift)
     named = {name: float(value) for name, value in {**terms, **costs, **extra}.items()}
-    numbers = placed.detach().double().numpy()
+    numbers = placed.detach().double().cpu().numpy()
     return Fit(float(numbers[0]), numbers[1:], delta, shift, named)
 
 

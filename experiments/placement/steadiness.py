@@ -22,7 +22,7 @@ class Steadiness:
     def __init__(self, problem: Problem, weights: PlacementSettings) -> None:
         self._problem, self._weights = problem, weights
         columns, foot = sole_columns(problem.body, problem.vertex_ids)
-        height = problem.vertices[:, columns, 2].double().numpy()
+        height = problem.vertices[:, columns, 2].double().cpu().numpy()
         shares = stance_shares(height, foot, problem.floor)
         self._columns = torch.as_tensor(columns, device=problem.vertices.device)
         self._stance = torch.as_tensor(shares).to(problem.vertices)
