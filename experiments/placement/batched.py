@@ -33,7 +33,8 @@ def batched_terms(
     read = torch.cat([touching, inside])
     first = torch.zeros_like(read, dtype=torch.int32)
     first[len(touching) :] = volumes.thick_from
-    gap, depth = volumes.distance(points, read, first).split([len(touching), len(inside)])
+    distance = volumes.distance(points, read, first)
+    gap, depth = distance[: len(touching)], distance[len(touching) :]
 
     n_frames, n_vertices = problem.contact.shape
     n_starts, k = points.shape[1] // problem.contact.numel(), problem.touching_k

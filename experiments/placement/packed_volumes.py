@@ -80,7 +80,8 @@ class PackedVolumes:
         """Place of a node in a flattened volume; overwrites `node`."""
         _, depth, height = self.shape
         i, j, k = node
-        return i.mul_(depth * height).add_(j, alpha=height).add_(k)
+        place: Integer[Tensor, " M"] = i.mul_(depth * height).add_(j, alpha=height).add_(k)
+        return place
 
 
 class _Trilinear(torch.autograd.Function):
