@@ -37,14 +37,14 @@ STRIDE = 4
 """The samples are compared on every so many frames."""
 MAX_TOUCHING = 2
 """Samples that touch and are offered."""
-MAX_CLASSES = 3
+MAX_CLASSES = 4
 """Maps that are offered for one of them, differing in the class that is touched most."""
 LEAST_TOUCH = 3
 """As many vertices off the feet, for `LEAST_TIME` of the clip, make a touch."""
 LEAST_TIME = 0.1
 LEAST_SHARE = 0.05
 """Where the scene's classes are together less likely than this, what is to be touched is not there."""
-RIVAL_SHARE = 0.4
+RIVAL_SHARE = 0.15
 """A class with this much of the leading class's probability is an alternative to it."""
 ALIKE = 0.8
 """Samples whose touches share at least this much of their union count as one."""
