@@ -44,8 +44,10 @@ LEAST_TOUCH = 3
 LEAST_TIME = 0.1
 LEAST_SHARE = 0.05
 """Where the scene's classes are together less likely than this, what is to be touched is not there."""
+LEAST_RIVAL = 0.01
+"""A class less likely than this is no alternative even where the scene has no other."""
 RIVAL_SHARE = 0.15
-"""A class with this much of the leading class's probability is an alternative to it."""
+"""A class with this much of the probability of the scene's likeliest is an alternative."""
 ALIKE = 0.8
 """Samples whose touches share at least this much of their union count as one."""
 ABSENT = -30.0
@@ -280,10 +282,15 @@ def class_alternatives(
     there = label == leading
     touched = there[::STRIDE]
     share = class_share[touched].mean(0) if touched.any() else np.zeros(N_CLASSES)
+    present = np.array([name in scene_classes for name in MPCAT40])
+    present[[0, leading, FLOOR]] = False
+    best = max(
+        share[present].max(initial=0.0), share[leading] * (MPCAT40[leading] in scene_classes)
+    )
+    likely = present & (share >= max(RIVAL_SHARE * best, LEAST_RIVAL))
     maps = [scores]
     for rival in np.argsort(-share, kind="stable").tolist():
-        likely = share[rival] >= RIVAL_SHARE * share[leading] and MPCAT40[rival] in scene_classes
-        if likely and rival not in (0, leading, FLOOR) and len(maps) < MAX_CLASSES:
+        if likely[rival] and len(maps) < MAX_CLASSES:
             traded = scores.copy()
             traded[there] = _raised(traded[there], rival)
             maps.append(traded)
