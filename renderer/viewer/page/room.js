@@ -1,6 +1,6 @@
 // The room: its glTF as meshes, grouped so that walls and tall furniture can leave the view.
 import {
-  Box3, BufferAttribute, BufferGeometry, Group, Mesh, MeshLambertMaterial, Raycaster, RepeatWrapping,
+  Box3, BufferAttribute, BufferGeometry, DoubleSide, Group, Mesh, MeshLambertMaterial, Raycaster, RepeatWrapping,
   SRGBColorSpace, Texture, Vector3,
 } from "three";
 
@@ -22,6 +22,7 @@ export class Room {
     this.mode = "cutaway";
     const solid = glb.json.materials.map((material) => roomMaterial(material, textures));
     const [wallXray, thingXray] = ["wall", "thing"].map((kind) => solid.map((material) => seeThrough(material, kind)));
+    const outside = solid.map((material) => occluded(Object.assign(material.clone(), { side: DoubleSide })));
     for (const index of glb.json.nodes[0].children) {
       const node = glb.json.nodes[index];
       const group = new Group();
@@ -35,6 +36,7 @@ export class Room {
         mesh.userData = {
           solid: solid[primitive.material],
           xray: xray[primitive.material],
+          outside: outside[primitive.material],
           open: mesh.geometry.attributes.occlusion.array.slice(),
           released: new Map((part.extras?.released ?? []).map((name, n) => [
             name, glb.accessor(primitive.attributes[`_RELEASED_${n}`]).array])),
@@ -60,7 +62,8 @@ export class Room {
       const fades = this.mode === "xray"
         ? group.name !== "floor"
         : this.mode === "cutaway" && group.visible && tall && !touched && hides(eye, body, group);
-      const kind = fades ? "xray" : "solid";
+      // The shell has no backs; asked for solid walls, it shows them from outside too.
+      const kind = fades ? "xray" : this.mode === "solid" && wall !== null ? "outside" : "solid";
       for (const mesh of group.children) mesh.material = mesh.userData[kind];
     }
     this.#relight();
