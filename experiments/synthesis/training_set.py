@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import torch
@@ -45,7 +45,7 @@ class TrainingSet:
     def rooms(self) -> dict[int, Room]:
         """The rooms of the split by their index in the data; their volumes come from the cache."""
         return {
-            index: self._room(record.name)
+            index: _room(record.name, self.device)
             for index, record in enumerate(self.data.rooms)
             if record.split == self.split
         }
@@ -127,13 +127,15 @@ class TrainingSet:
         rest = np.stack([load_body(name).rest_joints[0] for name in BODY_NAMES])
         return torch.tensor(rest, dtype=torch.float32)
 
-    def _room(self, name: str) -> Room:
-        scene = training_scene(name)
-        points = torch.from_numpy(scene_points(scene)).to(self.device)
-        return Room(name, points, scene.room_size[:2], SceneLookup(scene))
-
     def _tensor(self, values: np.ndarray) -> Tensor:
         return torch.as_tensor(values, dtype=torch.float32, device=self.device)
+
+
+@lru_cache(maxsize=64)
+def _room(name: str, device: torch.device) -> Room:
+    scene = training_scene(name)
+    points = torch.from_numpy(scene_points(scene)).to(device)
+    return Room(name, points, scene.room_size[:2], SceneLookup(scene))
 
 
 def turned_vectors(
