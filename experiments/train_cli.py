@@ -38,6 +38,11 @@ def train() -> None:
 @click.option("--mixed", is_flag=True, help="Forward pass in bfloat16.")
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint in the folder.")
 @click.option("--sweep", is_flag=True, help="Train once for each of several KL weights.")
+@click.option(
+    "--report",
+    is_flag=True,
+    help="Compare the shipped and the folder's networks with all baselines.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def posa(
     out: Path,
@@ -52,6 +57,7 @@ def posa(
     mixed: bool,
     resume: bool,
     sweep: bool,
+    report: bool,
     as_json: bool,
 ) -> None:
     """Train the human-scene interaction model (POSA's cVAE, re-implemented)."""
@@ -70,6 +76,13 @@ def posa(
         mixed=mixed,
     )
     again = f"pace-study train posa --out {out} ... --resume"
+    if report:
+        from experiments.interaction.posa_report import report_folder
+
+        with progress_bars(f"pace-study train posa --out {out} --report") as bars:
+            found, tables = report_folder(out, data_seed, bars)
+        click.echo(json.dumps(found) if as_json else tables)
+        return
     with progress_bars(again) as bars:
         dataset = training_run.training_data(data_seed, bars)
         run = training_run.sweep_kl if sweep else training_run.train_one

@@ -14,10 +14,8 @@ from jaxtyping import Bool, Float, Integer
 from torch import Tensor
 
 from experiments.interaction.contact_dataset import ContactDataset
-from experiments.interaction.contact_training import Bodies, labelled
+from experiments.interaction.contact_training import Bodies, batches, labelled
 from experiments.interaction.network import ContactNetwork
-
-BATCH = 256
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,7 @@ def encode_rows(
 ) -> tuple[Float[Tensor, "N Z"], Float[Tensor, "N Z"]]:
     """Posterior mean and log variance of some bodies."""
     with torch.no_grad():
-        parts = [network.encode(*bodies.batch(part)) for part in rows.split(BATCH)]
+        parts = [network.encode(*bodies.batch(part)) for part in batches(rows)]
     return torch.cat([part[0] for part in parts]), torch.cat([part[1] for part in parts])
 
 
@@ -94,7 +92,7 @@ def contact_of(
     """Contact above one half, decoded with one z a body."""
     found = []
     with torch.no_grad():
-        for part, codes in zip(rows.split(BATCH), z.split(BATCH), strict=True):
+        for part, codes in zip(batches(rows), batches(z), strict=True):
             vertices, height, _, _ = bodies.batch(part)
             found.append(network.decode(vertices, height, codes)[0] > 0)
     return np.asarray(torch.cat(found).numpy())

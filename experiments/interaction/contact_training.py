@@ -186,6 +186,11 @@ def labelled(
     return Bodies(*(torch.as_tensor(array, device=device) for array in arrays))
 
 
+def batches(rows: Tensor, size: int = 256) -> list[Tensor]:
+    """The rows in pieces of at most `size`."""
+    return [rows[start : start + size] for start in range(0, len(rows), size)]
+
+
 def one_cycle(step: int, total: int, peak: float, warm: float = 0.1) -> float:
     """Learning rate: cosine from peak/25 up to `peak` at `warm`, then cosine down to almost nothing."""
     rising = max(1.0, warm * total)
@@ -226,7 +231,7 @@ def validation_loss(
     sums = np.zeros(3)
     state.network.eval()
     with torch.no_grad():
-        for part in rows.split(256):
+        for part in batches(rows):
             batch = bodies.batch(part)
             noise = torch.zeros((len(part), settings.latent), device=part.device)
             terms = training_loss(state.network, batch, noise, settings)

@@ -28,7 +28,7 @@ def vertex_parts(body: SkinnedBody) -> Integer[np.ndarray, " V"]:
     """Index into `PART_NAMES` of every feature vertex, by the joint of its largest skinning weight."""
     part_of = [PART_NAMES.index(PART_OF_JOINT[name]) for name in JOINT_NAMES]
     heaviest = body.weights[feature_vertices(body)].argmax(axis=1)
-    return np.array(part_of, dtype=np.int64)[heaviest]
+    return np.asarray(np.array(part_of, dtype=np.int64)[heaviest])
 
 
 def feature_faces(body: SkinnedBody) -> Integer[np.ndarray, "F 3"]:

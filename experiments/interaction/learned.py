@@ -255,7 +255,7 @@ def one_class_a_touch(
         indices = [MPCAT40.index(name) for name in classes]
         of_parts = np.isin(parts, [PART_NAMES.index(name) for name in names])
         touch = np.isin(label, indices) & of_parts
-        spans, count = label_spans(_bridged(touch.any(1), gap))
+        spans, count = label_spans(_bridged(np.any(touch, axis=1), gap))
         for span in range(1, count + 1):
             there = touch & (spans == span)[:, None]
             share = softmax(scores[there].astype(np.float64), axis=-1).mean(0)

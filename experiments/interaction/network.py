@@ -74,6 +74,9 @@ class PointNetwork(ContactNetwork):
     touch there first. A head for each body part lets z switch whole supports on and off.
     """
 
+    parts: Tensor
+    members: Tensor
+
     def __init__(self, shape: NetworkShape, parts: Integer[Tensor, " V"]) -> None:
         super().__init__()
         self.shape = shape

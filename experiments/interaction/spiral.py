@@ -86,6 +86,8 @@ def _ordered_rings(faces: Integer[np.ndarray, "F 3"], n_vertices: int) -> list[l
 class SpiralConv(nn.Module):
     """Gather a spiral, concatenate its channels, one linear layer."""
 
+    spirals: Tensor
+
     def __init__(self, spirals: Integer[Tensor, "V L"], inputs: int, outputs: int) -> None:
         super().__init__()
         self.register_buffer("spirals", spirals, persistent=False)

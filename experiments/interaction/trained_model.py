@@ -14,14 +14,12 @@ from torch import Tensor
 from experiments.interaction.contact_baselines import Prediction
 from experiments.interaction.contact_dataset import FPS, ContactDataset
 from experiments.interaction.contact_selection import encode_rows
-from experiments.interaction.contact_training import labelled
+from experiments.interaction.contact_training import batches, labelled
 from experiments.interaction.learned import SMOOTHING_S, BodyFrames, prior_samples, touching_codes
 from experiments.interaction.network import ContactNetwork
 
-BATCH = 256
 
-
-@dataclass(frozen=True)
+@dataclass
 class TrainedModel:
     """A network under the name that tables give it; implements `contact_report.ContactModel`."""
 
@@ -66,7 +64,7 @@ class TrainedModel:
         rows = torch.arange(len(data.clip))
         logits, classes = [], []
         with torch.no_grad():
-            for part in rows.split(BATCH):
+            for part in batches(rows):
                 vertices, height = (
                     torch.as_tensor(array[part.numpy()]).float()
                     for array in (data.vertices, data.height)

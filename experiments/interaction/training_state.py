@@ -59,7 +59,7 @@ class TrainingState:
     def apply(self, loss: Tensor, rate: float) -> None:
         """One step of Adam with the gradient's norm capped."""
         self.optimiser.zero_grad(set_to_none=True)
-        loss.backward()
+        loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_NORM)
         for group in self.optimiser.param_groups:
             group["lr"] = rate

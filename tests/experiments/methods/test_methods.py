@@ -20,7 +20,7 @@ from experiments.placement.solver import fit_altered, fit_rigid
 from experiments.scene.synthetic import synthetic_room
 from renderer.files import InputError
 
-FAST = PRESETS["fast"]
+FAST = dataclasses.replace(PRESETS["fast"], interaction="geometric")
 
 
 def test_every_method_puts_the_sitter_on_the_seat(placed, slim, seat_room) -> None:
