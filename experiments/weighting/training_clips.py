@@ -27,7 +27,7 @@ SCENE_CLASSES: tuple[tuple[str, ...], ...] = (
     ("floor", "wall", "sofa", "bed", "stool", "counter", "seating", "shelving"),
 )
 """Two made-up lists of what a scene has, so that the same motion is seen with other classes."""
-RECORDED_STRIDE, AUTHORED_STRIDE = 3, 4
+RECORDED_STRIDE, AUTHORED_STRIDE = 3, 6
 """Of the pool's recorded and authored sources, one in so many is trained on."""
 MOST_FRAMES = 300
 """Longer clips are cut to a part of this length."""

@@ -24,7 +24,9 @@ def test_equal_clusters_give_the_interval_of_scipy() -> None:
 
 def test_unequal_clusters_give_the_interval_of_scipy_for_a_ratio_of_sums() -> None:
     generator = np.random.default_rng(8)
-    values = {str(i): generator.normal(i, 1, int(generator.integers(1, 5))).tolist() for i in range(11)}
+    values = {
+        str(i): generator.normal(i, 1, int(generator.integers(1, 5))).tolist() for i in range(11)
+    }
     sums = np.array([sum(cases) for cases in values.values()])
     counts = np.array([len(cases) for cases in values.values()])
 
