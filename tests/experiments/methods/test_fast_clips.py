@@ -22,7 +22,7 @@ from experiments.placement.placement import read_placement
 from experiments.placement.settings import PRESETS
 from renderer.catalogue import read_catalogue
 
-FAST = PRESETS["fast"]
+FAST = dataclasses.replace(PRESETS["fast"], interaction="geometric", weighting="geometric")
 
 
 @pytest.fixture(scope="module")
