@@ -1,6 +1,7 @@
 """Whole-sequence refinement: Adam on the body vectors of all frames (Wang et al., CVPR 2021, 3.4).
 
-Terms, weights and schedule are those of the published code: `docs/decisions/synthesis-refinement.md`.
+Terms, weights and schedule are those of the published code, but for what
+`docs/decisions/synthesis-refinement.md` says.
 """
 
 from __future__ import annotations
@@ -85,10 +86,13 @@ def refine(
 
 
 def collision(distance: Float[Tensor, "T V"]) -> Float[Tensor, ""]:
-    """Mean depth of the vertices that are inside something, metres, summed over frames."""
+    """Mean depth of the vertices that are inside something, metres, averaged over frames.
+
+    The published code sums over frames; why this does not is in the decision note.
+    """
     inside = distance < 0
     depth = torch.where(inside, -distance, torch.zeros_like(distance)).sum(dim=1)
-    return (depth / inside.sum(dim=1).clamp(min=1)).sum()
+    return (depth / inside.sum(dim=1).clamp(min=1)).mean()
 
 
 def motion(

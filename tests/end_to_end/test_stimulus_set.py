@@ -1,9 +1,10 @@
-"""A small stimulus set, built for real: one room, one motion, two methods, every kind of clip."""
+"""A small stimulus set, built for real: one room, one motion, three methods, every kind of clip."""
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -26,8 +27,8 @@ set_id = "small"
 seed = 3
 scenes = ["bedroom"]
 motions = ["walk_turn_right"]
-methods = ["posa_t", "pace"]
-study_methods = ["posa_t", "pace"]
+methods = ["posa_t", "synthesis", "pace"]
+study_methods = ["posa_t", "synthesis", "pace"]
 cut_seconds = 1.0
 [placement]
 preset = "fast"
@@ -58,7 +59,7 @@ def test_the_set_holds_main_catch_and_practice_pairs_and_is_sound(built: BuildOu
     shown = sorted((clip.role, clip.method) for clip in catalogue.clips)
     assert shown == [
         ("catch", "lifted"), ("catch", "pace"), ("main", "pace"), ("main", "posa_t"),
-        ("practice", "lifted"), ("practice", "pace"),
+        ("main", "synthesis"), ("practice", "lifted"), ("practice", "pace"),
     ]  # fmt: skip
     assert verify_catalogue(built.folder) == []
     assert built.dropped == ()
@@ -71,9 +72,21 @@ def test_both_clips_of_the_pair_have_length_and_cameras_in_common(built: BuildOu
     assert sum(camera["role"] == "main" for camera in catalogue.cameras) == 1
 
 
+def test_the_synthesised_clip_is_marked_and_fills_the_slot_of_its_pair(built: BuildOutcome) -> None:
+    catalogue = read_catalogue(built.folder)
+    shares = {method["name"]: method["shares_motion"] for method in catalogue.methods}
+    assert shares == {"posa_t": True, "synthesis": False, "pace": True}
+    name = next(m["display_name"] for m in catalogue.methods if m["name"] == "synthesis")
+    assert re.fullmatch(r"Motion synthesis \(re-implemented, \d+ min of capture\)", name)
+    clips = {clip.method: clip for clip in catalogue.main_clips()}
+    assert clips["synthesis"].motion == clips["pace"].motion == "walk_turn_right"
+    assert "cv2" in clips["pace"].scores and "cv2" not in clips["synthesis"].scores
+    assert {"non_collision", "contact"} <= set(clips["synthesis"].scores)
+
+
 def test_no_file_that_participants_receive_is_named_after_a_method(built: BuildOutcome) -> None:
     names = " ".join(path.name for path in (built.folder / "clips").iterdir())
-    assert all(word not in names for word in ("pace", "posa", "lifted", "bedroom", "walk"))
+    assert all(word not in names for word in ("pace", "posa", "synth", "lifted", "bedroom", "walk"))
 
 
 def test_a_second_build_changes_no_byte(built: BuildOutcome, config_file: Path) -> None:
@@ -101,7 +114,7 @@ def test_a_build_killed_in_mid_clip_goes_on_clip_by_clip_to_the_same_set(
         _wait_for(lambda: any(notes.glob("*.json")) and any(folder.glob("clips/.partial-*")))
         os.killpg(run.pid, signal.SIGKILL)
     done = {path: path.stat().st_mtime_ns for path in (folder / "clips").glob("*.mp4")}
-    assert 0 < len(done) < 6 and not (folder / "catalogue.json").exists()
+    assert 0 < len(done) < 7 and not (folder / "catalogue.json").exists()
     build_set(read_config(config_file), folder, jobs=1)
     assert {path: path.stat().st_mtime_ns for path in done} == done
     assert read_catalogue(folder).clips == read_catalogue(built.folder).clips
