@@ -48,6 +48,19 @@ def test_the_papers_study_asks_sixty_questions_of_its_set(paper) -> None:
     assert set(study.extra_trials.model_dump().values()) == {0}
 
 
+@pytest.mark.parametrize("name", ["demo", "ablation", "paper"])
+def test_every_shipped_set_shows_all_four_study_methods(name) -> None:
+    config = read_config(CONFIGS / f"{name}.toml")
+    assert set(config.study_methods) == {key for key, method in METHODS.items() if method.study}
+    assert config.study_methods[-1] == "pace"
+
+
+def test_the_demonstration_asks_about_the_methods_it_shows() -> None:
+    study, shown = read_study(CONFIGS / "demo-study.toml"), read_config(CONFIGS / "demo.toml")
+    assert {study.target, *study.baselines} == set(shown.study_methods)
+    assert set(study.scenes) == set(shown.scenes)
+
+
 def test_motions_of_a_folder_are_drawn_by_the_seed(paper, tmp_path) -> None:
     folder = SetFolder(tmp_path)
     config = dataclasses.replace(paper, motions_dir=_folder(tmp_path, 40), motions_wanted=10)
