@@ -94,6 +94,6 @@ def test_the_comparison_places_twelve_motions_or_more_in_the_four_test_rooms() -
     config = read_config(CONFIGS / "ablation.toml")
     validate_names(config)
     assert set(config.scenes) == set(TEST_ROOMS) and len(config.motions) >= 12
-    assert set(config.methods) == set(METHODS) - {"synthesis"}
+    assert set(config.methods) == set(METHODS)
     assert (config.placement.preset, config.placement.full_motions) == ("fast", 2)
     assert config.other_methods_motions == 0
