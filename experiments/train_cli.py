@@ -94,10 +94,10 @@ def posa(
 @train.command()
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the run.")
 @click.option(
-    "--interaction", default="geometric", show_default=True, help="Which model makes the features."
+    "--interaction", default="learned", show_default=True, help="Which model makes the features."
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the run.")
-@click.option("--epochs", type=click.IntRange(1), default=30, show_default=True)
+@click.option("--epochs", type=click.IntRange(1), default=60, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def weights(out: Path, interaction: str, seed: int, epochs: int, as_json: bool) -> None:
     """Train the network g of the frame weights; go on where an earlier run in --out stopped."""

@@ -34,7 +34,7 @@ class TrainingSettings:
     interaction: str
     """Which interaction model makes the features: a name in `INTERACTIONS`."""
     seed: int = 0
-    epochs: int = 30
+    epochs: int = 60
     learning_rate: float = 1e-3
     batch: int = 4
     """Clips whose gradients are averaged in one step."""
