@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from experiments.methods import METHODS
@@ -13,9 +15,9 @@ PLACING = ("posa_t", "paak", "pace", "pace_no_pose", "pace_no_motion", "posa_t_p
 
 @pytest.fixture(scope="session")
 def placed(sit, slim, seat_room):
-    """(motion, {method: placement}) in the room with one seat, preset fast."""
+    """(motion, {method: placement}) in the room with one seat, preset fast, contacts by rule."""
     motion = sit(45, stand=0.3)
-    settings = PRESETS["fast"]
+    settings = dataclasses.replace(PRESETS["fast"], interaction="geometric")
     return motion, {
         name: METHODS[name].place(motion, seat_room, slim, settings, 1) for name in PLACING
     }

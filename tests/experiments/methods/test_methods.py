@@ -11,6 +11,7 @@ from experiments.methods.outcome import best_fit, fault
 from experiments.methods.preparation import prepare
 from experiments.methods.rigid import rigid_fits
 from experiments.metrics import plausibility
+from experiments.placement.engines import engine_of
 from experiments.placement.errors import NoAdmissibleStart, OptimisationFailed
 from experiments.placement.features import choose_features
 from experiments.placement.placement import read_placement, write_placement
@@ -18,6 +19,7 @@ from experiments.placement.problem import build_problem
 from experiments.placement.settings import PRESETS
 from experiments.placement.solver import fit_altered, fit_rigid
 from experiments.scene.synthetic import synthetic_room
+from experiments.weighting.weights import FrameWeights
 from renderer.files import InputError
 
 FAST = dataclasses.replace(PRESETS["fast"], interaction="geometric")
@@ -45,8 +47,8 @@ def test_the_placed_motion_reproduces_the_recorded_energy(placed, slim, seat_roo
     placement = placements["pace"]
     features = choose_features(motion, seat_room, slim, FAST)
     problem = build_problem(placement.motion, seat_room, slim, FAST, features)
-    weighted = dataclasses.replace(problem, k=problem.k.new_tensor(placement.weights))
-    terms = weighted.terms(weighted.vertices)
+    weighted = problem.weighted(FrameWeights(placement.weights, "recorded"))
+    terms = engine_of(FAST).terms(weighted, weighted.vertices)
     for name, value in terms.items():
         assert float(value) == pytest.approx(placement.terms[name], rel=2e-3, abs=1e-4)
     assert placement.terms["total"] == pytest.approx(
