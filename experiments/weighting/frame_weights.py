@@ -8,6 +8,7 @@ import hashlib
 import numpy as np
 import torch
 from jaxtyping import Float
+from scipy.ndimage import gaussian_filter1d
 
 from experiments.body.model import BodyModel
 from experiments.interaction.features import InteractionFeatures
@@ -23,10 +24,14 @@ from experiments.weighting.weights_file import load_network
 from renderer.files import InputError
 
 RULES = ("paak", "geometric", "uniform")
-LAMBDA_G = 0.5
+LAMBDA_G = 0.7
 """Share of the estimated geometric weight (ours: PACE gives neither factor)."""
-LAMBDA_B = 0.5
-"""Share of the diversity score (ours)."""
+LAMBDA_B = 0.3
+"""Share of the diversity score (ours): at equal shares a held sit, whose frames are all alike, would
+weigh less than the walk that led to it."""
+SMOOTHING_FRAMES = 2.0
+"""Standard deviation of the smoothing of W_d over time, in frames at 30 per second: k also stiffens
+E_alt, and neighbours that look alike must not differ by the luck of the draw."""
 
 
 def frame_weights(
@@ -59,13 +64,14 @@ def frame_weights(
 def active_weights(
     network: FrameWeightNetwork, inputs: MotionInputs, seed: int
 ) -> Float[np.ndarray, " T"]:
-    """K = lambda_g K_g^ + lambda_b W_d, both of mean 1, scaled to mean 1."""
+    """K = lambda_g K_g^ + lambda_b W_d, both of mean 1 and W_d smoothed, scaled to mean 1."""
     with torch.no_grad():
         hidden = network.hidden(inputs)
         scores = network.head(hidden)
         estimate = np.asarray(network.expectation(scores).double().numpy())
-    spread = diversity(*gradient_factors(scores, hidden), seed)
-    mixed = LAMBDA_G * estimate / estimate.mean() + LAMBDA_B * spread
+    drawn = diversity(*gradient_factors(scores, hidden), seed)
+    spread = gaussian_filter1d(drawn, SMOOTHING_FRAMES * inputs.stride, mode="nearest")
+    mixed = LAMBDA_G * estimate / estimate.mean() + LAMBDA_B * spread / spread.mean()
     return np.asarray(mixed / mixed.mean())
 
 

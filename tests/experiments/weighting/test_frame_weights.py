@@ -9,6 +9,7 @@ import pytest
 
 from experiments.interaction.geometric import geometric_features
 from experiments.placement.settings import PRESETS
+from experiments.weighting.diversity import diversity, gradient_factors
 from experiments.weighting.frame_weights import (
     active_weights,
     clip_seed,
@@ -61,14 +62,19 @@ def test_rules_are_chosen_by_name_and_others_are_refused(sit, slim) -> None:
         frame_weights(motion, slim, features, uniform, 0)
 
 
-def test_half_of_the_weight_is_the_estimate_and_half_the_diversity(network, some_inputs) -> None:
+def test_the_weights_are_the_printed_sum_of_estimate_and_smoothed_diversity(
+    network, some_inputs
+) -> None:
     inputs = some_inputs(40)
-    weights = active_weights(network, inputs, seed=5)
-    estimate = network.expectation(network(inputs)).double().numpy()
-    diversity = 2.0 * weights - estimate / estimate.mean()
-    # Picks are whole numbers out of 256 repeats, a quarter of the frames each: steps of 1 / 64.
-    assert diversity * 64 == pytest.approx(np.round(diversity * 64), abs=1e-3)
-    assert diversity.min() > -1e-6 and diversity.mean() == pytest.approx(1.0)
+    hidden = network.hidden(inputs)
+    scores = network.head(hidden)
+    estimate = network.expectation(scores).double().numpy()
+    drawn = diversity(*gradient_factors(scores, hidden), 5)
+    # A Gaussian of two frames, cut at four standard deviations, the ends held.
+    kernel = np.exp(-(np.arange(-8, 9) ** 2) / 8.0)
+    smooth = np.convolve(np.pad(drawn, 8, mode="edge"), kernel / kernel.sum(), mode="valid")
+    expected = 0.7 * estimate / estimate.mean() + 0.3 * smooth / smooth.mean()
+    assert active_weights(network, inputs, seed=5) == pytest.approx(expected, rel=1e-6)
 
 
 def test_motions_of_one_set_draw_independently(sit) -> None:
