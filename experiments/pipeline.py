@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any
 
@@ -172,6 +172,7 @@ def run_all(
         return outcomes
     # Spawn, because OpenGL contexts do not survive a fork. Workers are not replaced after some
     # tasks: the pool of Python 3.11 and 3.12 can hang for ever when they are.
+    others = set(active_children())
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         pending: set[Future[str]] = {pool.submit(work, item) for item in waiting}
         try:
@@ -180,6 +181,9 @@ def run_all(
                 outcomes.extend(future.result() for future in finished)
                 progress(stage, len(outcomes), len(items))
         except BaseException:
+            # Results are written whole or not at all, so nobody has to wait for jobs under way.
+            for worker in set(active_children()) - others:
+                worker.terminate()
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     return outcomes

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import multiprocessing
 import operator
 from pathlib import Path
 
@@ -28,6 +30,20 @@ def test_many_more_jobs_than_workers_all_finish(tmp_path: Path) -> None:
     outcomes = run_all(work, jobs, 2, "place", lambda *step: seen.append(step))
     assert sorted(outcomes) == sorted(job.motion_id for job in jobs)
     assert seen[0] == ("place", 0, 50) and seen[-1] == ("place", 50, 50)
+
+
+def test_nobody_waits_for_jobs_under_way_when_a_run_ends_early(tmp_path: Path) -> None:
+    long = PlaceJob(CONFIG, tmp_path, "bedroom", "walk_straight", "pace")
+    with pytest.raises(InputError, match="no_such_motion"):
+        run_all(
+            run_place,
+            [long, dataclasses.replace(long, motion_id="no_such_motion")],
+            2,
+            "place",
+            lambda *step: None,
+        )
+    assert not multiprocessing.active_children()
+    assert long.reusable() is None and list(tmp_path.rglob("*")) == []
 
 
 def test_a_failing_job_ends_the_run_with_its_one_line(tmp_path: Path) -> None:
