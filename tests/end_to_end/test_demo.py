@@ -25,6 +25,8 @@ pytestmark = pytest.mark.slow
 def finished(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """A whole run that was interrupted once on its way."""
     out = tmp_path_factory.mktemp("demo") / "run"
+    # Started in the background of a script, this process ignores Ctrl-C and its children would too.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     first = subprocess.Popen([*COMMAND, str(out)], cwd=ROOT, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 900
     while not list(out.glob("records/*.json")) and not list(out.glob("stimuli/records/*.json")):
