@@ -62,9 +62,12 @@ test("a report that waited for an earlier one to leave says for how long", async
 
 for (const status of [0, 429, 503]) {
   test(`reports that met ${status || "no line"} come again as the same ones and say that they waited`, async () => {
+    const real = performance.now;
+    performance.now = () => 0; // a busy machine must not look like an earlier report in the way
     replies = [status];
     box.report("play", "first", { view: 1 });
     await pass(2000);
+    performance.now = real;
     const [one, two] = sent.map((post) => post.body.events[0]);
     assert.equal(two.uuid, one.uuid);
     assert.deepEqual([one.detail, two.detail], [{ view: 1 }, { view: 1, queued: true }]);
