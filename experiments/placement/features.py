@@ -11,7 +11,7 @@ import numpy as np
 
 from experiments.body.model import BodyModel
 from experiments.interaction.features import InteractionFeatures
-from experiments.interaction.registry import INTERACTIONS, first_fitting_map
+from experiments.interaction.registry import INTERACTIONS, InteractionModel, first_fitting_map
 from experiments.motion.motion import Motion
 from experiments.placement.candidates import coarse_best, start_grid
 from experiments.placement.errors import NoAdmissibleStart
@@ -37,9 +37,9 @@ def choose_features(
         raise InputError("placement settings", "interaction", settings.interaction, wanted)
     arrays = (motion.pose, motion.transl, motion.times)
     digest = hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
-    model = id(INTERACTIONS[settings.interaction])
-    key = (digest, motion.motion_id, id(scene), id(body), model, settings.config_hash())
-    return _chosen(_Question(key, motion, scene, body, settings))
+    model = INTERACTIONS[settings.interaction]
+    key = (digest, motion.motion_id, id(scene), id(body), id(model), settings.config_hash())
+    return _chosen(_Question(key, motion, scene, body, model, settings))
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,7 @@ class _Question:
     motion: Motion = field(compare=False)
     scene: Scene = field(compare=False)
     body: BodyModel = field(compare=False)
+    model: InteractionModel = field(compare=False)
     settings: PlacementSettings = field(compare=False)
 
 
@@ -57,7 +58,7 @@ class _Question:
 def _chosen(question: _Question) -> InteractionFeatures:
     motion, scene = question.motion, question.scene
     body, settings = question.body, question.settings
-    maps = INTERACTIONS[settings.interaction](motion, body, scene.class_names())
+    maps = question.model(motion, body, scene.class_names())
     if settings.feature_choice == "posa":
         return maps[first_fitting_map(maps, scene)]
     if len(maps) == 1:

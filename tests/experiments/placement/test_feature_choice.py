@@ -73,3 +73,14 @@ def test_the_first_refusal_is_told_where_no_map_has_a_start(
     settings = offer(relabelled(seated, "bed"), relabelled(seated, "toilet"))
     with pytest.raises(NoAdmissibleStart, match="bed"):
         choose_features(sit(60), seat_room, slim, settings)
+
+
+def test_an_answer_is_never_that_of_a_model_that_has_since_gone(
+    sit, slim, seat_room, seated
+) -> None:
+    settings, motion = dataclasses.replace(PRESETS["fast"], interaction="offered"), sit(60)
+    for number in range(8):  # each model's memory may be the place of the next
+        mine = dataclasses.replace(seated, model=f"model {number}")
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setitem(registry.INTERACTIONS, "offered", lambda *_, mine=mine: (mine,))
+            assert choose_features(motion, seat_room, slim, settings).model == f"model {number}"
