@@ -142,8 +142,15 @@ def _conditions(evaluation: dict[str, Any]) -> str:
         f"`{set_up['weighting']}`, printed scene terms{rule}. {cases['kept']} of {cases['all']} "
         "(scene, motion) were placed by every study method and count. Scores are means over frames, then "
         f"over clips, on the full skin and the unthickened distance, read from cells of {cells}. "
-        "Brackets: 95 % percentile bootstrap over motions."
+        "Brackets: 95 % percentile bootstrap over motions." + _semantics_off(set_up)
     )
+
+
+def _semantics_off(set_up: dict[str, Any]) -> str:
+    """A sentence on the scenes whose classes did not count, or nothing."""
+    scenes = set_up.get("semantics_off", {})
+    told = "; ".join(f"{scene} ({reason})" for scene, reason in scenes.items())
+    return f" No semantic term in {told}." if told else ""
 
 
 def _strict(methods: dict[str, Method], published: bool) -> str:

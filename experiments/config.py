@@ -23,7 +23,7 @@ class PlacementConfig:
     full_preset: str = "default"
     """`evaluate` also places some motions with this fuller preset, see `full_motions`."""
     full_motions: int = 0
-    """How many motions a room, the first ones, the study methods place with `full_preset` too."""
+    """How many motions a room, the first ones, are placed with `full_preset` too."""
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,8 +49,8 @@ def evaluate_set(
 ) -> dict[str, Any]:
     """Place and score everything a configuration asks for, and compare; goes on where it stopped.
 
-    Leaves `evaluation.json` and `table.md` in `out`. With `placement.full_motions` the study methods
-    also place the first so many motions with `placement.full_preset`, compared apart.
+    Leaves `evaluation.json` and `table.md` in `out`. With `placement.full_motions` the first so
+    many motions are placed with `placement.full_preset` as well, compared apart.
     """
     from experiments.pipeline import place_set
 
@@ -81,7 +81,6 @@ def full_config(config: StimulusSetConfig) -> StimulusSetConfig | None:
         config,
         set_id=f"{config.set_id}-full",
         motions=config.motions[: placement.full_motions],
-        methods=config.study_methods,
         placement=PlacementConfig(preset=placement.full_preset),
         extras=dataclasses.replace(config.extras, catch=0, practice=0),
     )
@@ -117,6 +116,7 @@ def compared(config: StimulusSetConfig, folder: SetFolder) -> dict[str, Any]:
             "weighting": settings.weighting,
             "contact_tolerance_m": settings.contact_tolerance,
             "sdf_cell_m": cells,
+            "semantics_off": _semantics_off(rows),
         },
         "rows": [
             {key: row.get(key) for key in ("scene", "motion", "method", "scores", "failure")}
@@ -133,6 +133,12 @@ def compared(config: StimulusSetConfig, folder: SetFolder) -> dict[str, Any]:
         ],
         "methods": compare(kept, config.methods, config.seed),
     }
+
+
+def _semantics_off(rows: Sequence[dict[str, Any]]) -> dict[str, str]:
+    """Scenes in which classes did not count, and why."""
+    told = [(row["scene"], row.get("info", {}).get("semantics_off", "")) for row in rows]
+    return {scene: reason for scene, reason in sorted(told) if reason}
 
 
 def read_evaluation(folder: Path) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float16, Integer, UInt8
 from renderer.files import InputError, atomic_path
 
 SCHEMA_VERSION = 1
-RECIPE_VERSION = 2
+RECIPE_VERSION = 3
 """Raised with every change of the recipe that changes the numbers."""
 DISTANCE_CAP_M = 0.5
 FPS = 30.0

@@ -170,9 +170,8 @@ def network_shape(dataset: ContactDataset, settings: TrainingSettings) -> Networ
     found = {0, *np.unique(label).tolist()}
     classes = range(N_CLASSES) if settings.all_classes else sorted(found)
     n_vertices = len(dataset.vertex_ids)
-    return NetworkShape(
-        settings.architecture, tuple(classes), n_vertices, settings.latent, settings.width
-    )
+    sizes = (settings.latent, settings.width, settings.thickness_m)
+    return NetworkShape(settings.architecture, tuple(classes), n_vertices, *sizes)
 
 
 def labelled(

@@ -15,6 +15,7 @@ import torch
 
 from experiments.body.embedded import load_body
 from experiments.interaction.contact_build import ClipBodies, clip_bodies
+from experiments.interaction.contact_dataset import Progress
 from experiments.interaction.contact_holds import PosedClip, posed_clip
 from experiments.interaction.contact_labels import LabelledFrames, carrying_columns, possible
 from experiments.interaction.contact_scene import ContactScene
@@ -42,7 +43,10 @@ def free_rooms(seed: int) -> tuple[Scene, ...]:
 
 
 def place_freely(
-    clips: Sequence[PoseClip], rooms: Sequence[Scene], seed: int
+    clips: Sequence[PoseClip],
+    rooms: Sequence[Scene],
+    seed: int,
+    progress: Progress | None = None,
 ) -> Iterator[ClipBodies]:
     """Each clip in some of the rooms, rooms in turn; nothing for a clip that fits in none of them."""
     for number, pose in enumerate(clips):
@@ -51,6 +55,8 @@ def place_freely(
             placed = placed_in(pose, room, seed)
             if placed is not None and len(placed.frame):
                 yield placed
+        if progress is not None:
+            progress(number + 1, len(clips))
 
 
 def placed_in(pose: PoseClip, room: Scene, seed: int) -> ClipBodies | None:

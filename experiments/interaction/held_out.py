@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 from experiments.interaction.contact_build import (
     build_dataset,
     build_second_draw,
@@ -13,15 +16,18 @@ from experiments.interaction.contact_dataset import ContactDataset, Progress
 from experiments.interaction.contact_report import TestSets
 from experiments.interaction.free_placement import free_rooms, place_freely
 
+Show = Callable[[str, int, int], None]
+"""(stage, done, of how many)."""
 
-def held_out_sets(seed: int = 0, progress: Progress | None = None) -> TestSets:
+
+def held_out_sets(seed: int, show: Show) -> TestSets:
     """What `report` needs: training bodies, both test sets, the second draw and the motions.
 
-    `progress` is told of the clips of the training data, the longest part of it (a minute or two the
-    first time, cached afterwards).
+    Built on first use (five minutes, most of it the furnished rooms), cached afterwards.
     """
-    whole = build_dataset(seed, progress)
-    second, free = build_second_draw(seed), build_free_dataset(seed)
+    whole = build_dataset(seed, partial(show, "bodies and scenes"))
+    second = build_second_draw(seed, partial(show, "other scenes"))
+    free = build_free_dataset(seed, partial(show, "furnished rooms"))
     fitted = whole.select(whole.bodies_of(split="test"))
     motions = {clip.name: clip.motion for clip in held_out_clips(seed)}
     # A clip in a room is the same motion, moved: the rule is given it unmoved.
@@ -30,11 +36,11 @@ def held_out_sets(seed: int = 0, progress: Progress | None = None) -> TestSets:
     return TestSets(train, fitted, second, free, motions)
 
 
-def build_free_dataset(seed: int = 0) -> ContactDataset:
+def build_free_dataset(seed: int = 0, progress: Progress | None = None) -> ContactDataset:
     """Held-out clips placed in furnished rooms by geometry alone. Cached by recipe and seed."""
-    return cached_dataset("free", seed, lambda: _placed(seed))
+    return cached_dataset("free", seed, lambda: _placed(seed, progress))
 
 
-def _placed(seed: int) -> ContactDataset:
+def _placed(seed: int, progress: Progress | None) -> ContactDataset:
     clips = [clip for clip in held_out_clips(seed) if clip.name.endswith("/0")]
-    return joined(list(place_freely(clips, free_rooms(seed), seed)))
+    return joined(list(place_freely(clips, free_rooms(seed), seed, progress)))

@@ -67,11 +67,11 @@ WEIGHTS_FOLDER = Path(__file__).resolve().parents[1] / "assets" / "weights"
 SHIPPED: dict[str, tuple[str, str]] = {
     "learned": (
         "posa_2cm.safetensors",
-        "1c19e90734e6390af61f041e98dbaa7f9bf2b35fa6a1c2397ee8f729bed3d147",
+        "4a59341bba45ad29da0faff91894ba31d319e1aed159aa30fe3a67b47daa1d79",
     ),
     "learned_5cm": (
         "posa_5cm.safetensors",
-        "1f31ca2a5baa4820e772bbf924e5b05d7797d7dfc8c8c670c424af8fe8493f4b",
+        "33cce1194f1d62352d4415f537637fc210ba85078423b3e13a99a3a4793f252f",
     ),
 }
 """Name of a model to its weights file and that file's SHA-256."""

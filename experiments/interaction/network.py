@@ -18,6 +18,13 @@ from torch.nn import functional
 LOG_VAR_RANGE = (-8.0, 4.0)
 NEAR_M = (0.05, 0.015)
 """Scales at which the closeness to the lowest, foremost and rearmost vertex is felt, metres."""
+EDGE_WIDTH_M = 0.002
+"""How soft the step is by which a vertex counts as nearer to the floor than a label's thickness."""
+
+FLOOR_REACH_M = 0.02
+"""How fast that step fades above the floor: what is higher is the other layers' to judge."""
+FLOOR_GAIN = 15.0
+"""What the step adds to the logit of contact before training: at first the network is the height rule."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +38,8 @@ class NetworkShape:
     n_vertices: int
     latent: int = 16
     width: int = 64
+    edge_m: float = 0.02
+    """Height above the floor at which `point` places its step: the thickness of the labels, metres."""
 
     @property
     def n_classes(self) -> int:
@@ -42,6 +51,8 @@ class ContactNetwork(nn.Module):
     """What every architecture offers. Axes: B bodies, V vertices, C classes, Z latent dimensions."""
 
     shape: NetworkShape
+    class_temperature: float = 1.0
+    """Divides the class logits of `decode`; fitted after training (`fit_class_temperature`)."""
 
     def encode(
         self,
@@ -71,7 +82,9 @@ class PointNetwork(ContactNetwork):
 
     A vertex brings its place, an embedding of its own, its height above the floor and how far it is
     above, behind and ahead of the lowest, foremost and rearmost vertex of its body part: surfaces
-    touch there first. A head for each body part lets z switch whole supports on and off.
+    touch there first. A head for each body part lets z switch whole supports on and off. Whether it
+    is lower than the label's thickness goes round the layers, straight to the answer: on open floor
+    that step is the label, and layers trained in half precision would blur it.
     """
 
     parts: Tensor
@@ -84,7 +97,7 @@ class PointNetwork(ContactNetwork):
         self.register_buffer("members", part_members(parts), persistent=False)
         width, out = shape.width, 1 + shape.n_classes
         n_parts = int(parts.max()) + 1
-        inputs = 3 + 4 + 4 * len(NEAR_M) + 16
+        inputs = 3 + 4 + 4 * len(NEAR_M) + 1 + 16
         self.embedding = nn.Parameter(0.1 * torch.randn(shape.n_vertices, 16))
         self.body = nn.Sequential(
             nn.Linear(3 * shape.n_vertices + 1, 256),
@@ -105,6 +118,9 @@ class PointNetwork(ContactNetwork):
         self.leave = nn.Linear(width, width)
         self.answer = nn.Linear(width, out)
         self.vertex_bias = nn.Parameter(torch.zeros(shape.n_vertices, out))
+        self.by_floor = nn.Parameter(torch.zeros(n_parts, out))
+        with torch.no_grad():
+            self.by_floor[:, 0] = FLOOR_GAIN
         self.part_head = nn.Linear(256, n_parts * out)
 
     def encode(
@@ -130,12 +146,14 @@ class PointNetwork(ContactNetwork):
         """See `ContactNetwork.decode`."""
         code = self.steer(torch.cat([self._body(vertices, height), z], dim=-1))
         scale, shift, late = self.film(code)[:, None].chunk(3, dim=-1)
-        hidden = functional.relu(self.enter(self._inputs(vertices, height)) * (1 + scale) + shift)
+        inputs = self._inputs(vertices, height)
+        hidden = functional.relu(self.enter(inputs) * (1 + scale) + shift)
         hidden = hidden + functional.relu(self.residual(hidden))
         hidden = functional.relu(self.leave(hidden) + late)
         by_part = self.part_head(code).unflatten(-1, (-1, 1 + self.shape.n_classes))
-        logits = self.answer(hidden) + self.vertex_bias + by_part[:, self.parts]
-        return logits[..., 0], logits[..., 1:]
+        floor = self._below_edge(height)[..., None] * self.by_floor[self.parts]
+        logits = self.answer(hidden) + self.vertex_bias + by_part[:, self.parts] + floor
+        return logits[..., 0], logits[..., 1:] / self.class_temperature
 
     def _body(
         self, vertices: Float[Tensor, "B V 3"], height: Float[Tensor, "B V"]
@@ -161,7 +179,13 @@ class PointNetwork(ContactNetwork):
         )
         near = [2 * torch.exp(-gaps.clamp(min=0) / scale) for scale in NEAR_M]
         embedding = self.embedding.expand(len(vertices), -1, -1)
-        return torch.cat([vertices, gaps, *near, embedding], dim=-1)
+        edge = self._below_edge(height)[..., None]
+        return torch.cat([vertices, gaps, *near, edge, embedding], dim=-1)
+
+    def _below_edge(self, height: Float[Tensor, "B V"]) -> Float[Tensor, "B V"]:
+        """1 below the edge, negative just above it, fading to 0 where the floor has no say."""
+        below = self.shape.edge_m - height
+        return torch.tanh(below / EDGE_WIDTH_M) * torch.exp(below.clamp(max=0) / FLOOR_REACH_M)
 
 
 def split_posterior(

@@ -9,11 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from experiments.interaction.contact_build import (
-    build_dataset,
-    build_second_draw,
-    held_out_clips,
-)
 from experiments.interaction.contact_report import (
     ReportRow,
     TestSets,
@@ -22,7 +17,7 @@ from experiments.interaction.contact_report import (
     report_table,
     score,
 )
-from experiments.interaction.held_out import build_free_dataset
+from experiments.interaction.held_out import held_out_sets
 from experiments.interaction.learned import SHIPPED, WEIGHTS_FOLDER
 from experiments.interaction.trained_model import TrainedModel
 from experiments.interaction.weights_file import load_weights
@@ -41,22 +36,12 @@ def report_folder(folder: Path, data_seed: int, show: Show) -> tuple[dict[str, A
     models = {name: WEIGHTS_FOLDER / file for name, (file, _) in SHIPPED.items()}
     for path in sorted((*folder.glob("model.safetensors"), *folder.glob("*/model.safetensors"))):
         models[path.parent.name] = path
-    rows = report_rows(models, held_out_sets(data_seed, show), show)
+    sets = held_out_sets(data_seed, show)
+    rows = report_rows(models, sets, show)
     record = {"rows": report_records(rows)}
     write_json(folder / "report.json", record)
     write_bytes(folder / "report.md", report_table(rows).encode())
     return record, report_table(rows)
-
-
-def held_out_sets(data_seed: int, show: Show) -> TestSets:
-    """All that a report needs, built on first use."""
-    data = build_dataset(data_seed, lambda done, total: show("bodies and scenes", done, total))
-    second = build_second_draw(data_seed, lambda done, total: show("other scenes", done, total))
-    show("furnished rooms", 0, 1)
-    free = build_free_dataset(data_seed)
-    motions = {clip.name: clip.motion for clip in held_out_clips(data_seed)}
-    train, test = (data.select(data.bodies_of(split=split)) for split in ("train", "test"))
-    return TestSets(train, test, second, free, motions)
 
 
 def report_rows(models: dict[str, Path], sets: TestSets, show: Show) -> list[ReportRow]:

@@ -14,8 +14,11 @@ from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
+from scipy.ndimage import gaussian_filter1d
 
 from experiments.body.embedded import BODY_NAMES
+from experiments.interaction.mesh import feature_vertices
 from experiments.interaction.pose_recipes import FAMILIES
 from experiments.motion.amc import read_amc
 from experiments.motion.bvh import read_bvh
@@ -33,6 +36,8 @@ NOISE_DEG = {"leg": 2.5, "trunk": 3.5, "arm": 6.0}
 """Standard deviation of the constant turn about each axis, by part of the body."""
 TEST_SHARE = 0.15
 """Of the authored clips; at least one of every family."""
+SMOOTH_FRAMES = 1.5
+"""Standard deviation of the Gaussian over the heights that bring a noisy clip back to its floor."""
 _MOST_FRAMES = 1500
 
 
@@ -177,12 +182,17 @@ def _part(joint: str) -> str:
 
 
 def _at_same_floor(noisy: Motion, original: Motion, figure: Figure) -> Motion:
-    """Moved by one constant height, so that its lowest points stand, in the middle, as they did."""
-    skin = np.concatenate([figure.body.body_component[::16], *figure.soles])
+    """Raised and lowered smoothly, so that its lowest points stand where they did on the floor.
+
+    One height for the whole clip would leave feet some millimetres off the floor that the model is
+    told of (the lowest vertex), and blur the edge of every label there.
+    """
+    skin = feature_vertices(figure.body)
     before, after = (lowest_height(motion, figure, skin) for motion in (original, noisy))
     on_floor = before < 0.05
-    frames = on_floor if on_floor.any() else np.ones_like(on_floor)
-    return _raised(noisy, float(np.median((before - after)[frames])))
+    frames = np.flatnonzero(on_floor if on_floor.any() else np.ones_like(on_floor))
+    shift = np.interp(np.arange(len(before)), frames, (before - after)[frames])
+    return _raised(noisy, gaussian_filter1d(shift, SMOOTH_FRAMES, mode="nearest"))
 
 
 def _grounded(motion: Motion, figure: Figure, grounding: str) -> Motion:
@@ -194,8 +204,9 @@ def _grounded(motion: Motion, figure: Figure, grounding: str) -> Motion:
     return _raised(motion, -float(np.percentile(lowest, 15)))
 
 
-def _raised(motion: Motion, height: float) -> Motion:
-    return dataclasses.replace(motion, transl=motion.transl + np.array([0.0, 0.0, height]))
+def _raised(motion: Motion, height: float | Float[np.ndarray, " T"]) -> Motion:
+    up = np.broadcast_to(height, len(motion.transl))[:, None] * np.array([0.0, 0.0, 1.0])
+    return dataclasses.replace(motion, transl=motion.transl + up)
 
 
 def _clip(name: str, family: str, grounding: str, test: bool = False) -> Recording:

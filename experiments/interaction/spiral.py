@@ -168,7 +168,7 @@ class SpiralNetwork(ContactNetwork):
         for convolve, norm in zip(self.decoder, self.decoder_norms[2:], strict=True):
             values = _normed(norm, convolve(values))
         logits = self.answer(values)
-        return logits[..., 0], logits[..., 1:]
+        return logits[..., 0], logits[..., 1:] / self.class_temperature
 
 
 def _normed(norm: nn.Module, values: Float[Tensor, "B V W"]) -> Float[Tensor, "B V W"]:

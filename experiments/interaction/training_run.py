@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 import torch
+from jaxtyping import Bool, Integer
 
+from experiments.interaction.class_calibration import fit_class_temperature
 from experiments.interaction.contact_build import build_dataset
 from experiments.interaction.contact_dataset import RECIPE_VERSION, ContactDataset
 from experiments.interaction.contact_selection import SampleScore, score_samples
@@ -52,6 +54,9 @@ def train_one(
     title = f"{settings.preset}, {100 * settings.thickness_m:g} cm, KL {settings.w_kl:g}"
     network, curve = train_network(dataset, settings, folder, device, resume, partial(show, title))
     network = network.cpu()
+    network.class_temperature = fit_class_temperature(
+        network, dataset, settings.thickness_m, judging_rows(split_validation(dataset)[1])
+    )
     note = note_of(network, curve, settings, dataset)
     save_weights(network, note, folder / "model.safetensors")
     write_curve(curve, folder)
@@ -74,8 +79,9 @@ def sweep_kl(
 ) -> dict[str, Any]:
     """Train one network for each of `KL_WEIGHTS` into sub-folders and name the best.
 
-    Best is the highest F1 of prior samples on captured held-out clips, among networks whose latent
-    code is in use (two active units or more), so that a deterministic map does not win by default.
+    Best is the highest F1 of prior samples on the validation clips, which are of the training part,
+    among networks whose latent code is in use there (two active units or more), so that a
+    deterministic map does not win by default.
     """
     runs = []
     for w_kl in KL_WEIGHTS:
@@ -83,8 +89,8 @@ def sweep_kl(
         chosen = dataclasses.replace(settings, w_kl=w_kl)
         again = resume and target.is_dir()
         runs.append(train_one(dataset, chosen, target, device, again, show))
-    alive = [run for run in runs if run["scores"]["captured"]["active_units"] >= 2] or runs
-    best = max(alive, key=lambda run: run["scores"]["captured"]["prior"])
+    alive = [run for run in runs if run["scores"]["validation"]["active_units"] >= 2] or runs
+    best = max(alive, key=lambda run: run["scores"]["validation"]["prior"])
     record = {"best_w_kl": best["settings"]["w_kl"], "runs": runs}
     write_json(folder / "sweep.json", record)
     return record
@@ -129,11 +135,16 @@ def judged(
     }
     scores = {}
     for name, mask in masks.items():
-        rows = np.flatnonzero(mask)
-        rows = rows[:: max(1, len(rows) // SCORED_BODIES)]
+        rows = judging_rows(mask)
         if len(rows):
             scores[name] = score_samples(network, dataset, settings.thickness_m, rows)
     return scores
+
+
+def judging_rows(mask: Bool[np.ndarray, " N"]) -> Integer[np.ndarray, " R"]:
+    """About `SCORED_BODIES` bodies of a mask, evenly spread."""
+    rows = np.flatnonzero(mask)
+    return rows[:: max(1, len(rows) // SCORED_BODIES)]
 
 
 def note_of(
@@ -154,4 +165,5 @@ def note_of(
         steps=best.steps,
         vertex_sha256=vertex_hash(dataset.vertex_ids),
         shape=network.shape,
+        class_temperature=network.class_temperature,
     )

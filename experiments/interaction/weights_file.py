@@ -41,6 +41,8 @@ class WeightsNote:
     vertex_sha256: str
     """Of the vertex ids that the network was trained on."""
     shape: NetworkShape
+    class_temperature: float = 1.0
+    """Of `ContactNetwork`; fitted on validation clips."""
     schema_version: int = SCHEMA_VERSION
 
 
@@ -71,6 +73,7 @@ def load_weights(source: Path, sha256: str | None = None) -> tuple[ContactNetwor
     note = _note(source, metadata.get("note", ""))
     network = build_network(note.shape, seed=0)
     network.load_state_dict(_checked(source, tensors, network.state_dict()))
+    network.class_temperature = note.class_temperature
     return network.eval(), note
 
 
@@ -100,6 +103,9 @@ def _note(source: Path, text: str) -> WeightsNote:
     if version != SCHEMA_VERSION:
         raise InputError(source, "schema_version", version, f"the number {SCHEMA_VERSION}")
     _check_shape(source, shape)
+    temperature = note.class_temperature
+    if not isinstance(temperature, float) or not 0.1 <= temperature <= 100.0:
+        raise InputError(source, "class_temperature", temperature, "a number from 0.1 to 100")
     return note
 
 
@@ -110,6 +116,8 @@ def _check_shape(source: Path, shape: NetworkShape) -> None:
     sizes = (shape.n_vertices, shape.latent, shape.width)
     if not all(isinstance(size, int) and 0 < size <= _LARGEST for size in sizes):
         raise InputError(source, "shape", sizes, f"whole numbers from 1 to {_LARGEST}")
+    if not isinstance(shape.edge_m, float) or not 0 < shape.edge_m < 1:
+        raise InputError(source, "edge_m", shape.edge_m, "a number of metres from 0 to 1")
     classes = shape.classes
     if not classes or classes[0] != 0 or list(classes) != sorted({*classes} & {*range(N_CLASSES)}):
         raise InputError(source, "classes", classes, "indices of mpcat40, ascending, 0 the first")

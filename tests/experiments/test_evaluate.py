@@ -202,6 +202,14 @@ def test_the_page_sets_our_table_beside_the_published_one(folder) -> None:
     assert "| booth | sit | pace | no place |" in page
 
 
+def test_a_room_without_classes_is_named_with_its_reason(folder, rows) -> None:
+    assert "No semantic term" not in comparison_markdown(compared(CONFIG, folder))
+    row = dict(rows[0], info={"semantics_off": "no object of the scene has a label"})
+    write_json(folder.record_path(row["scene"], row["motion"], row["method"]), row)
+    page = comparison_markdown(compared(CONFIG, folder))
+    assert "No semantic term in living (no object of the scene has a label)." in page
+
+
 def test_ablations_stand_with_their_predicted_frames_and_their_optimiser(folder, rows) -> None:
     for row in rows[:4]:
         if row["method"] == "pace_no_pose":
@@ -248,14 +256,14 @@ def test_a_plus_method_that_misses_is_reported_as_a_miss() -> None:
     assert "non-collision 0.9600 is BELOW 0.9700" in found
 
 
-def test_the_fuller_preset_is_for_the_first_motions_and_the_study_methods() -> None:
+def test_the_fuller_preset_is_for_the_first_motions_and_every_method() -> None:
     assert full_config(CONFIG) is None
     asked = dataclasses.replace(
         CONFIG, placement=PlacementConfig("fast", full_preset="paper", full_motions=2)
     )
     fuller = full_config(asked)
     assert fuller is not None
-    assert (fuller.motions, fuller.methods) == (("walk", "sit"), ("posa_t", "pace"))
+    assert (fuller.motions, fuller.methods) == (("walk", "sit"), CONFIG.methods)
     assert fuller.placement.preset == "paper" and full_config(fuller) is None
 
 

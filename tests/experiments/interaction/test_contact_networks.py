@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,6 +64,16 @@ def test_bodies_of_one_batch_do_not_influence_each_other(shape: NetworkShape) ->
     seen = network.encode(vertices, height, contact, label)[0]
     seen_alone = network.encode(vertices[1:2], height[1:2], contact[1:2], label[1:2])[0]
     assert torch.allclose(seen[1:2], seen_alone, atol=1e-5)
+
+
+@pytest.mark.parametrize("edge_m", [0.02, 0.05])
+def test_before_training_the_network_of_ours_is_the_height_rule(edge_m: float) -> None:
+    network = build_network(replace(POINT, edge_m=edge_m), seed=3)
+    vertices, height, _, _ = bodies(4)
+    height = height.clamp(max=edge_m + 0.02)
+    clear = (height - edge_m).abs() > 0.008  # beyond the soft step
+    logit = network.decode(vertices, height, torch.zeros(4, POINT.latent))[0]
+    assert torch.equal((logit > 0)[clear], (height < edge_m)[clear])
 
 
 def test_first_weights_are_those_of_the_seed_and_leave_torch_generator_alone() -> None:
