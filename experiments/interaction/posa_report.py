@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,14 +16,11 @@ from experiments.interaction.contact_report import (
     report_table,
     score,
 )
-from experiments.interaction.held_out import held_out_sets
+from experiments.interaction.held_out import Show, held_out_sets
 from experiments.interaction.learned import SHIPPED, WEIGHTS_FOLDER
 from experiments.interaction.trained_model import TrainedModel
 from experiments.interaction.weights_file import load_weights
 from renderer.files import write_bytes, write_json
-
-Show = Callable[[str, int, int], None]
-"""(stage, done, of how many)."""
 
 
 def report_folder(folder: Path, data_seed: int, show: Show) -> tuple[dict[str, Any], str]:

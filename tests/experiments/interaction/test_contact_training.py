@@ -184,6 +184,23 @@ def test_weights_come_back_as_they_were_saved_in_half_precision(note, tmp_path) 
         assert torch.equal(loaded.state_dict()[name], expected), name
 
 
+def test_the_temperature_of_the_classes_survives_the_file_and_flattens_classes_alone(
+    note, tmp_path
+) -> None:
+    target, network = tmp_path / "model.safetensors", build_network(note.shape, seed=1)
+    loaded = []
+    for temperature in (1.0, 2.5):
+        save_weights(network, dataclasses.replace(note, class_temperature=temperature), target)
+        loaded.append(load_weights(target)[0])
+    size = note.shape.n_vertices
+    vertices, height = torch.ones((1, size, 3)), torch.full((1, size), 0.3)
+    plain, flat = (
+        net.decode(vertices, height, torch.zeros(1, note.shape.latent)) for net in loaded
+    )
+    assert torch.equal(plain[0], flat[0])
+    assert plain[1].any() and torch.allclose(plain[1] / 2.5, flat[1])
+
+
 def test_damaged_or_foreign_weights_are_refused_by_name(note, tmp_path) -> None:
     target = tmp_path / "model.safetensors"
     save_weights(build_network(note.shape, seed=1), note, target)
@@ -202,6 +219,10 @@ def test_damaged_or_foreign_weights_are_refused_by_name(note, tmp_path) -> None:
         ({"schema_version": 2}, "schema_version: got 2, wanted the number 1"),
         ({"shape": {"architecture": "cube"}}, "architecture: got 'cube', wanted one of point"),
         ({"shape": {"width": 10**9}}, "shape: .* wanted whole numbers from 1 to 4096"),
+        ({"shape": {"edge_m": 0.0}}, "edge_m: got 0.0, wanted a number of metres from 0 to 1"),
+        ({"shape": {"edge_m": 2.0}}, "edge_m: got 2.0, wanted a number of metres"),
+        ({"class_temperature": 0.0}, "class_temperature: got 0.0, wanted a number from 0.1 to 100"),
+        ({"class_temperature": 1e3}, "class_temperature: got 1000.0, wanted a number"),
         ({"shape": {"classes": [2, 1]}}, "classes: .* wanted indices of mpcat40"),
         ({"seed": None, "what": 1}, "note: .* wanted the note of an interaction model"),
     ],
